@@ -1,0 +1,253 @@
+#include "blend/blend.h"
+
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numeric>
+
+#include "blend/batch.h"
+
+namespace patchwork {
+
+namespace {
+
+using Candidates = std::vector<std::uint32_t>;
+
+// Coordinates are compared with this much room (window cells), so that rounding decides nothing.
+constexpr double kRoom = 1e-6;
+constexpr std::size_t kParallelPoints = 16384;  // smaller parts are done by one thread
+
+LatticeRect to_window(const LatticeRect& r, const Blend::Placed& p, double scale) {
+  return {r.i0 * scale - p.first_i, r.j0 * scale - p.first_j, r.i1 * scale - p.first_i,
+          r.j1 * scale - p.first_j};
+}
+
+Blend::Placed place(const Database& db, PatchId id, int smoothness) {
+  const Grid& g = db.grid(id.grid());
+  const Frame& f = g.info.frame;
+  const GridShape& shape = g.info.shape;
+  Blend::Placed p{};
+  const double scale = std::ldexp(1, -id.level());
+  const auto& inverse = f.inverse();
+  p.id = id, p.x0 = f.numbers()[0], p.y0 = f.numbers()[3];
+  p.ua = inverse[0] * scale, p.ub = inverse[1] * scale, p.va = inverse[2] * scale, p.vb = inverse[3] * scale;
+  p.first_i = id.bx() * kKernelCells - kExtensionCells - 1,
+  p.first_j = id.by() * kKernelCells - kExtensionCells - 1;
+  const LatticeRect domain = shape.domain(id.level(), id.bx(), id.by());
+  p.kernel = to_window(shape.kernel(id.level(), id.bx(), id.by()), p, scale);
+  p.domain = to_window(domain, p, scale);
+  p.samples = to_window({0, 0, shape.width() - 1.0, shape.height() - 1.0}, p, scale);
+  p.ragged = g.at(id.level(), id.bx(), id.by()).ragged();
+  p.rim = g.info.rim_error;
+  p.error = g.at(id.level(), id.bx(), id.by()).error[size_t(smoothness)];
+  p.volume = 4 / ((domain.i1 - domain.i0) * (domain.j1 - domain.j0) * f.cell_area());
+  p.quantum = g.info.quantum, p.base = g.info.base, p.origin = double(g.info.code_origin);
+  p.source = std::int32_t(&g - db.grids().data()) + 1;
+  p.bounds = f.bounds(domain);
+  return p;
+}
+
+// The patches among `from` that may reach a quadrangle, in order. With priority none after one whose kernel
+// holds it all; `inside` tells that this one is the first.
+Candidates filter(const std::vector<Blend::Placed>& placed, const Candidates& from, const Point corners[4],
+                  bool priority, bool& inside) {
+  Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
+  for (int k = 0; k < 4; ++k)
+    e = {std::min(e.xmin, corners[k].x), std::min(e.ymin, corners[k].y), std::max(e.xmax, corners[k].x),
+         std::max(e.ymax, corners[k].y)};
+  Candidates kept;
+  inside = false;
+  for (const std::uint32_t c : from) {
+    const Blend::Placed& p = placed[c];
+    if (!p.bounds.meets(e)) continue;
+    const LatticeRect w = p.window_bounds(corners);
+    if (w.i1 < p.domain.i0 - kRoom || w.i0 > p.domain.i1 + kRoom || w.j1 < p.domain.j0 - kRoom ||
+        w.j0 > p.domain.j1 + kRoom)
+      continue;
+    kept.push_back(c);
+    const bool holds = w.i0 > p.kernel.i0 + kRoom && w.i1 < p.kernel.i1 - kRoom &&
+                       w.j0 > p.kernel.j0 + kRoom && w.j1 < p.kernel.j1 - kRoom;
+    if (priority && holds && !p.ragged) {
+      inside = kept.size() == 1;
+      break;
+    }
+  }
+  return kept;
+}
+
+struct Tally {
+  BlendCounts counts;
+  void add(const BlendCounts& c) {
+    counts.points += c.points, counts.contributions += c.contributions;
+    counts.most = std::max(counts.most, c.most), counts.bound_max = std::max(counts.bound_max, c.bound_max);
+  }
+};
+
+struct Worker {
+  Batch batch;
+  Tally tally;
+};
+
+// What both kinds of evaluation share.
+struct Run {
+  const Database& db;
+  const std::vector<Blend::Placed>& placed;
+  const BlendOptions& options;
+  const BlendOutput& out;
+  tbb::enumerable_thread_specific<Worker> workers;
+
+  bool priority() const { return options.composition == Composition::priority; }
+  BlendCounts counts() {
+    Tally all;
+    for (const Worker& w : workers) all.add(w.tally.counts);
+    return all.counts;
+  }
+  template <class Index>  // index(k): where the batch's k-th point goes
+  void compose(Batch& batch, const Candidates& candidates, bool inside, Tally& tally, Index index) const {
+    batch.compose(db, placed, candidates, inside, options);
+    tally.add(batch.counts);
+    for (std::size_t k = 0; k < batch.x.size(); ++k) {
+      const std::size_t to = index(k);
+      if (!out.height.empty()) out.height[to] = batch.height[k];
+      if (!out.bound.empty()) out.bound[to] = batch.bound[k];
+      if (!out.source.empty()) out.source[to] = batch.source[k];
+      if (!out.patch.empty()) out.patch[to] = batch.patch[k];
+    }
+  }
+};
+
+// Points are halved along the longer side of their bounds, and the patches with them, until a batch is left.
+class PointRun : public Run {
+ public:
+  PointRun(const Run& run, std::span<const double> x, std::span<const double> y) : Run(run), x_(x), y_(y) {}
+
+  void halve(std::span<std::uint32_t> points, const Candidates& from) {
+    Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
+    for (const std::uint32_t k : points)
+      e = {std::min(e.xmin, x_[k]), std::min(e.ymin, y_[k]), std::max(e.xmax, x_[k]),
+           std::max(e.ymax, y_[k])};
+    const Point corners[4] = {{e.xmin, e.ymin}, {e.xmax, e.ymin}, {e.xmax, e.ymax}, {e.xmin, e.ymax}};
+    bool inside = false;
+    const Candidates candidates = filter(placed, from, corners, priority(), inside);
+    // Few points under many patches are halved on: each batch asks all of its candidates about all of its
+    // points.
+    if (points.size() <= Batch::kPoints && (points.size() <= 32 || inside || candidates.size() <= 8)) {
+      Worker& w = workers.local();
+      Batch& batch = w.batch;
+      batch.x.resize(points.size()), batch.y.resize(points.size());
+      for (std::size_t k = 0; k < points.size(); ++k) batch.x[k] = x_[points[k]], batch.y[k] = y_[points[k]];
+      compose(batch, candidates, inside, w.tally, [&](std::size_t k) { return points[k]; });
+      return;
+    }
+    const auto& along = e.xmax - e.xmin > e.ymax - e.ymin ? x_ : y_;
+    const auto middle = points.begin() + std::ptrdiff_t(points.size() / 2);
+    std::nth_element(points.begin(), middle, points.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return along[a] < along[b]; });
+    const auto low = points.first(points.size() / 2), high = points.subspan(points.size() / 2);
+    if (points.size() < kParallelPoints) {
+      halve(low, candidates), halve(high, candidates);
+    } else {
+      tbb::parallel_invoke([&] { halve(low, candidates); }, [&] { halve(high, candidates); });
+    }
+  }
+
+ private:
+  std::span<const double> x_, y_;
+};
+
+// The same for a rectangle of pixels.
+class PixelRun : public Run {
+ public:
+  static constexpr int kSide = 32;
+  PixelRun(const Run& run, const RasterFrame& raster, int width, int row)
+      : Run(run), raster_(raster), width_(width), row_(row) {}
+
+  void halve(int c0, int r0, int c1, int r1, const Candidates& from) {
+    const Point corners[4] = {at(c0, r0), at(c1 - 1, r0), at(c1 - 1, r1 - 1), at(c0, r1 - 1)};
+    bool inside = false;
+    const Candidates candidates = filter(placed, from, corners, priority(), inside);
+    if (c1 - c0 <= kSide && r1 - r0 <= kSide) {
+      evaluate(c0, r0, c1, r1, candidates, inside);
+      return;
+    }
+    // Splits at multiples of the batch's side, so that batches are full.
+    const auto middle = [](int a, int b) { return a + std::max(kSide, (b - a) / 2 / kSide * kSide); };
+    const bool across = c1 - c0 >= r1 - r0;
+    const int m = across ? middle(c0, c1) : middle(r0, r1);
+    const auto low = [&] { across ? halve(c0, r0, m, r1, candidates) : halve(c0, r0, c1, m, candidates); };
+    const auto high = [&] { across ? halve(m, r0, c1, r1, candidates) : halve(c0, m, c1, r1, candidates); };
+    if (size_t(c1 - c0) * size_t(r1 - r0) < kParallelPoints)
+      low(), high();
+    else
+      tbb::parallel_invoke(low, high);
+  }
+
+ private:
+  Point at(int c, int r) const {
+    return {raster_.x0 + (raster_.xc * c + raster_.xr * r), raster_.y0 + (raster_.yc * c + raster_.yr * r)};
+  }
+  void evaluate(int c0, int r0, int c1, int r1, const Candidates& candidates, bool inside) {
+    Worker& w = workers.local();
+    Batch& batch = w.batch;
+    const int n = (c1 - c0) * (r1 - r0), across = c1 - c0;
+    batch.x.resize(size_t(n)), batch.y.resize(size_t(n));
+    for (int r = r0, k = 0; r < r1; ++r)
+      for (int c = c0; c < c1; ++c, ++k) {
+        const Point p = at(c, r);
+        batch.x[size_t(k)] = p.x, batch.y[size_t(k)] = p.y;
+      }
+    compose(batch, candidates, inside, w.tally, [&](std::size_t k) {
+      const int r = r0 + int(k) / across, c = c0 + int(k) % across;
+      return size_t(r - row_) * size_t(width_) + size_t(c);
+    });
+  }
+  const RasterFrame& raster_;
+  int width_, row_;
+};
+
+Candidates all_of(const std::vector<Blend::Placed>& placed) {
+  Candidates all(placed.size());
+  std::iota(all.begin(), all.end(), 0u);
+  return all;
+}
+
+}  // namespace
+
+Blend::Blend(const Database& db, std::span<const PatchId> patches, const BlendOptions& options)
+    : db_(db), options_(options) {
+  assert(options.smoothness >= 0 && options.smoothness <= 2);
+  auto placed = std::make_shared<std::vector<Placed>>();
+  placed->reserve(patches.size());
+  for (const PatchId id : patches) placed->push_back(place(db, id, options.smoothness));
+  placed_ = std::move(placed);
+}
+
+BlendCounts Blend::at_points(std::span<const double> x, std::span<const double> y,
+                             const BlendOutput& out) const {
+  PointRun run({db_, *placed_, options_, out, {}}, x, y);
+  std::vector<std::uint32_t> points(x.size());
+  std::iota(points.begin(), points.end(), 0u);
+  const auto finite = std::partition(points.begin(), points.end(), [&](std::uint32_t k) {
+    return std::isfinite(x[k]) && std::isfinite(y[k]);
+  });
+  for (auto k = finite; k != points.end(); ++k) {
+    if (!out.height.empty()) out.height[*k] = NAN;
+    if (!out.bound.empty()) out.bound[*k] = NAN;
+    if (!out.source.empty()) out.source[*k] = 0;
+    if (!out.patch.empty()) out.patch[*k] = -1;
+  }
+  if (finite != points.begin()) run.halve({points.begin(), finite}, all_of(*placed_));
+  return run.counts();
+}
+
+BlendCounts Blend::at_pixels(const RasterFrame& raster, int width, int row, int rows,
+                             const BlendOutput& out) const {
+  PixelRun run({db_, *placed_, options_, out, {}}, raster, width, row);
+  if (width > 0 && rows > 0) run.halve(0, row, width, row + rows, all_of(*placed_));
+  return run.counts();
+}
+
+}  // namespace patchwork

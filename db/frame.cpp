@@ -1,0 +1,52 @@
+#include "db/frame.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "db/error.h"
+
+namespace patchwork {
+
+namespace {
+// Axes further from orthogonal than this (cosine) are shear, not the rounding of a printed rotation.
+constexpr double kMaxShear = 1e-5;
+}  // namespace
+
+Frame::Frame(const std::array<double, 6>& n) : n_(n) {
+  const double det = n[1] * n[5] - n[2] * n[4];
+  inverse_ = {n[5] / det, -n[2] / det, -n[4] / det, n[1] / det};
+}
+
+Frame Frame::from_geotransform(const std::array<double, 6>& gt, const std::string& where) {
+  if (!std::all_of(gt.begin(), gt.end(), [](double v) { return std::isfinite(v); }))
+    throw Error(where, "its geotransform is not finite", "georeference the file again");
+  const double si = std::hypot(gt[1], gt[4]), sj = std::hypot(gt[2], gt[5]);
+  if (!(si > 0) || !(sj > 0) || !std::isfinite(si * sj))
+    throw Error(where, "its geotransform has a step of zero", "georeference the file again");
+  const double cosine = (gt[1] * gt[2] + gt[4] * gt[5]) / (si * sj);
+  if (std::abs(cosine) > kMaxShear)
+    throw Error(where, "its geotransform is sheared (axes not at right angles)",
+                "warp it first, e.g. with gdalwarp");
+  return Frame(
+      {gt[0] + 0.5 * gt[1] + 0.5 * gt[2], gt[1], gt[2], gt[3] + 0.5 * gt[4] + 0.5 * gt[5], gt[4], gt[5]});
+}
+
+double Frame::step_i() const { return std::hypot(n_[1], n_[4]); }
+double Frame::step_j() const { return std::hypot(n_[2], n_[5]); }
+double Frame::cell_area() const { return std::abs(n_[1] * n_[5] - n_[2] * n_[4]); }
+double Frame::angle_degrees() const { return std::atan2(n_[4], n_[1]) * 180 / std::numbers::pi; }
+
+Extent Frame::bounds(const LatticeRect& r) const {
+  Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
+  for (const double i : {r.i0, r.i1})
+    for (const double j : {r.j0, r.j1}) {
+      const Point p = to_domain(i, j);
+      e = {std::min(e.xmin, p.x), std::min(e.ymin, p.y), std::max(e.xmax, p.x), std::max(e.ymax, p.y)};
+    }
+  const double sx = 4e-16 * std::max(std::abs(e.xmin), std::abs(e.xmax));
+  const double sy = 4e-16 * std::max(std::abs(e.ymin), std::abs(e.ymax));
+  return {e.xmin - sx, e.ymin - sy, e.xmax + sx, e.ymax + sy};
+}
+
+}  // namespace patchwork

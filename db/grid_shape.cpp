@@ -1,0 +1,47 @@
+#include "db/grid_shape.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace patchwork {
+
+GridShape::GridShape(int width, int height, bool pixel_is_area)
+    : width_(width), height_(height), pad_(pixel_is_area ? 0.5 : 0.0) {
+  assert(width >= 2 && height >= 2);
+  const LatticeRect f = footprint();
+  // At most a quarter of a side is given to the feather, so that the smallest grid keeps a kernel.
+  const double fi = std::min<double>(kFeatherCells, (f.i1 - f.i0) / 4);
+  const double fj = std::min<double>(kFeatherCells, (f.j1 - f.j0) / 4);
+  core_ = {f.i0 + fi, f.j0 + fj, f.i1 - fi, f.j1 - fj};
+  for (int level = 0;; ++level) {
+    const double side = std::ldexp(kKernelCells, level);
+    const Level l{int(std::ceil(core_.i1 / side)), int(std::ceil(core_.j1 / side)), blocks_};
+    levels_.push_back(l);
+    blocks_ += size_t(l.bi) * size_t(l.bj);
+    if (l.bi == 1 && l.bj == 1) break;
+  }
+}
+
+LatticeRect GridShape::kernel(int level, int bx, int by) const {
+  const double side = std::ldexp(kKernelCells, level);
+  return {std::max(core_.i0, bx * side), std::max(core_.j0, by * side), std::min(core_.i1, (bx + 1) * side),
+          std::min(core_.j1, (by + 1) * side)};
+}
+
+LatticeRect GridShape::domain(int level, int bx, int by) const {
+  const double side = std::ldexp(kKernelCells, level), rim = std::ldexp(kExtensionCells, level);
+  const LatticeRect f = footprint();
+  return {std::max(f.i0, bx * side - rim), std::max(f.j0, by * side - rim),
+          std::min(f.i1, (bx + 1) * side + rim), std::min(f.j1, (by + 1) * side + rim)};
+}
+
+GridShape::Block GridShape::block(std::size_t index) const {
+  int level = 0;
+  while (level + 1 < levels() && index >= levels_[size_t(level) + 1].first) ++level;
+  const Level& l = levels_[size_t(level)];
+  const std::size_t k = index - l.first;
+  return {level, int(k % size_t(l.bi)), int(k / size_t(l.bi))};
+}
+
+}  // namespace patchwork

@@ -1,0 +1,403 @@
+// A grid's way into the database: bands to payloads and errors, errors to records, records to tops, all in
+// one transaction.
+#define XXH_INLINE_ALL
+#include <fmt/format.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "db/database_impl.h"
+#include "db/error.h"
+#include "db/invariant.h"
+#include "db/patch_errors.h"
+
+namespace patchwork {
+
+namespace {
+
+// Below this share of changed boxes the tree is changed box by box, above it is packed anew.
+constexpr double kRebuildShare = 0.25;
+constexpr double kRimFactor =
+    0.375;  // (t^2 + t) / 2 at half a cell: what a second difference makes of extrapolation
+constexpr int kTaskRows = kChunkVertices;
+constexpr std::size_t kMaxGrids = 0xffff;
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+class Stopwatch {
+ public:
+  void add_to(double& sum) { sum += now() - start_, start_ = now(); }
+
+ private:
+  double start_ = now();
+};
+
+class DigestBuilder {
+ public:
+  DigestBuilder() { XXH3_128bits_reset(state_); }
+  ~DigestBuilder() { XXH3_freeState(state_); }
+  DigestBuilder(const DigestBuilder&) = delete;
+  DigestBuilder& operator=(const DigestBuilder&) = delete;
+  template <class T>
+  void add(const T* data, std::size_t n) {
+    XXH3_128bits_update(state_, data, n * sizeof(T));
+  }
+  Digest get() const {
+    XXH128_canonical_t canonical;
+    XXH128_canonicalFromHash(&canonical, XXH3_128bits_digest(state_));
+    Digest d;
+    std::copy(std::begin(canonical.digest), std::end(canonical.digest), d.begin());
+    return d;
+  }
+
+ private:
+  XXH3_state_t* state_ = XXH3_createState();
+};
+
+class MaskCells : public CellSource {
+ public:
+  MaskCells(const CellMasks& masks, int level) : masks_(masks), level_(level) {}
+  std::uint8_t cell(int i, int j) const override {
+    return masks_.at(level_, std::clamp(i, 0, masks_.cols(level_) - 1),
+                     std::clamp(j, 0, masks_.rows(level_) - 1));
+  }
+
+ private:
+  const CellMasks& masks_;
+  int level_;
+};
+
+class Importer {
+ public:
+  Importer(Database::Impl& db, const RasterSource& source, const ImportOptions& options)
+      : db_(db),
+        options_(options),
+        source_(source),
+        ingest_(source, options.memory, [&](double share) { say(0.2 * share); }),
+        errors_(ingest_.shape()) {
+    watch_.add_to(report_.seconds.scan);
+  }
+
+  ImportReport run() {
+    describe();
+    for (int y = 0; y < shape().height(); y += ingest_.band_rows()) {
+      const Ingest::Band band = ingest_.read_band(y, std::min(shape().height(), y + ingest_.band_rows()));
+      watch_.add_to(report_.seconds.scan);
+      digest(band);
+      measure(band);
+      watch_.add_to(report_.seconds.errors);
+      for (const Lattice& l : band.levels) encode(l, band.y0 >> l.level(), chunk_end(l, band.y1));
+      say(0.2 + 0.7 * double(band.y1) / shape().height());
+    }
+    for (int l = Ingest::kStreamedLevels; l < shape().levels(); ++l)
+      encode(ingest_.coarse(l), 0, shape().lattice_rows(l));
+    watch_.add_to(report_.seconds.encode);
+    finish_grid();
+    if (!report_.duplicate_of.empty()) return report_;
+    add_to_state();
+    watch_.add_to(report_.seconds.invariant);
+    return report_;
+  }
+
+ private:
+  const GridShape& shape() const { return grid_.info.shape; }
+  void say(double share) const {
+    if (options_.progress) options_.progress(share);
+  }
+
+  void describe() {
+    GridInfo& g = grid_.info;
+    const Quantiser& q = ingest_.quantiser();
+    g.name = options_.name, g.frame = source_.frame(), g.shape = ingest_.shape(),
+    g.accuracy = source_.accuracy();
+    g.quantum = source_.scale() * q.quantum, g.base = source_.offset(), g.code_origin = q.origin;
+    g.quantisation = q.error * std::abs(source_.scale());
+    g.holes = !ingest_.masks().empty(), g.sample_bytes = source_.sample_bytes();
+    const double numbers[] = {g.accuracy,
+                              g.quantum,
+                              g.base,
+                              double(g.code_origin),
+                              g.shape.pad(),
+                              double(g.shape.width()),
+                              double(g.shape.height())};
+    digest_.add(numbers, std::size(numbers));
+    digest_.add(g.frame.numbers().data(), g.frame.numbers().size());
+    // The row is needed first: payloads name the grid's id. Name and digest are set right at the end.
+    g.digest = provisional_digest();
+    g.id = db_.store.add_grid(g);
+    if (g.id.value > kMaxGrids) throw Error(db_.store.path(), "it holds as many grids as it can");
+  }
+  Digest provisional_digest() const {
+    DigestBuilder d;
+    d.add(options_.name.data(), options_.name.size());
+    return d.get();
+  }
+
+  void digest(const Ingest::Band& band) {
+    const Lattice& l = band.levels[0];
+    for (int y = band.y0; y < band.y1; ++y) {
+      digest_.add(l.row(y), size_t(shape().width()));
+      if (!band.valid.empty())
+        digest_.add(band.valid.data() + size_t(y - l.first()) * size_t(shape().width()),
+                    size_t(shape().width()));
+      note_rim(l, y);
+    }
+  }
+
+  // Second differences across the border: what the half cell beyond it may hide.
+  void note_rim(const Lattice& l, int y) {
+    const int w = shape().width(), h = shape().height();
+    if (!shape().pixel_is_area()) return;
+    const float* v = l.row(y);
+    if (w > 2)
+      rim_i_ = std::max<double>(
+          {rim_i_, std::abs(v[0] - 2 * v[1] + v[2]), std::abs(v[w - 1] - 2 * v[w - 2] + v[w - 3])});
+    if (h > 2 && (y == 0 || y == h - 1))
+      for (int i = 0; i < w; ++i) {
+        const int inward = y == 0 ? 1 : -1;
+        rim_j_ =
+            std::max<double>(rim_j_, std::abs(v[i] - 2 * l.row(y + inward)[i] + l.row(y + 2 * inward)[i]));
+      }
+  }
+
+  const Lattice& lattice(const Ingest::Band& band, int level) const {
+    return level < Ingest::kStreamedLevels ? band.levels[size_t(level)] : ingest_.coarse(level);
+  }
+
+  void measure(const Ingest::Band& band) {
+    const int tasks = (band.y1 - band.y0 + kTaskRows - 1) / kTaskRows;
+    tbb::parallel_for(0, tasks * shape().levels(), [&](int task) {
+      const int level = task / tasks, y0 = band.y0 + task % tasks * kTaskRows;
+      const int y1 = std::min(band.y1, y0 + kTaskRows);
+      errors_.measure(lattice(band, level), band.levels[0], band.valid, y0, y1);
+    });
+  }
+
+  static int chunk_end(const Lattice& l, int y1) {
+    return l.first() + l.count() == l.rows() ? l.rows() : y1 >> l.level();
+  }
+
+  void encode(const Lattice& l, int r0, int r1) {
+    const int first = r0 / kChunkVertices, end = (r1 + kChunkVertices - 1) / kChunkVertices;
+    const int across = shape().chunks_i(l.level());
+    std::vector<Bytes> blobs(size_t(std::max(0, end - first)) * size_t(across));
+    tbb::parallel_for(size_t(0), blobs.size(), [&](std::size_t k) {
+      blobs[k] = encode_chunk(cut_chunk(l, int(k) % across, first + int(k) / across));
+    });
+    watch_.add_to(report_.seconds.encode);
+    for (std::size_t k = 0; k < blobs.size(); ++k)
+      db_.store.put_payload(grid_.info.id, l.level(), int(k) % across, first + int(k) / across, blobs[k]);
+    watch_.add_to(report_.seconds.store);
+  }
+
+  Chunk cut_chunk(const Lattice& l, int cx, int cy) const {
+    Chunk c = make_chunk(shape(), l.level(), cx, cy);
+    c.codes.resize(size_t(c.cols) * size_t(c.rows));
+    for (int j = 0; j < c.rows; ++j) {
+      const float* from = l.row(cy * kChunkVertices + j) + cx * kChunkVertices;
+      std::int32_t* to = c.codes.data() + size_t(j) * size_t(c.cols);
+      for (int i = 0; i < c.cols; ++i) to[i] = std::int32_t(from[i]);
+    }
+    if (ingest_.masks().empty()) return c;
+    const MaskCells cells(ingest_.masks(), l.level());
+    bool real = true;
+    for (int j = 0; j < c.rows; ++j)
+      for (int i = 0; i < c.cols; ++i) {
+        c.cells.push_back(cells.cell(cx * kChunkVertices + i, cy * kChunkVertices + j));
+        real &= (c.cells.back() & CellMasks::kReal) != 0;
+      }
+    if (real) c.cells.clear();
+    return c;
+  }
+
+  void finish_grid() {
+    GridInfo& g = grid_.info;
+    g.digest = digest_.get();
+    g.rim_error = kRimFactor * (rim_i_ + rim_j_) * std::abs(g.quantum);
+    for (const Grid& other : db_.grids)
+      if (other.info.digest == g.digest) report_.duplicate_of = other.info.name;
+    report_.name = g.name, report_.accuracy = g.accuracy, report_.quantisation = g.quantisation;
+    report_.extent = g.frame.bounds(g.shape.footprint());
+    if (!report_.duplicate_of.empty()) return;
+    make_records();
+    if (std::none_of(grid_.patches.begin(), grid_.patches.end(),
+                     [](const PatchRecord& p) { return p.exists(); }))
+      throw Error(source_.path(), "it holds no cell with data at all four corners");
+    db_.store.update_grid(g);
+  }
+
+  void make_records() {
+    grid_.patches.resize(shape().blocks());
+    std::vector<Offer> offers(ingest_.masks().empty() ? 0 : shape().blocks());
+    tbb::parallel_for(size_t(0), grid_.patches.size(), [&](std::size_t k) {
+      const GridShape::Block b = shape().block(k);
+      PatchRecord& p = grid_.patches[k];
+      p.flags = PatchRecord::kExists;
+      double outline = 0;
+      if (!offers.empty()) outline = look_at_holes(b, p, offers[k]), offers[k].index = std::uint32_t(k);
+      const std::array<double, 3> delta = errors_.of(b.level, b.bx, b.by);
+      for (std::size_t i = 0; i < 3; ++i)
+        p.error[i] = std::max(
+            grid_.info.accuracy + grid_.info.quantisation + delta[i] * std::abs(grid_.info.quantum), outline);
+    });
+    for (const Offer& o : offers)
+      if (grid_.patches[o.index].exists() && grid_.patches[o.index].ragged()) grid_.offers.push_back(o);
+  }
+
+  // Sets the record's flags; returns the error that the outline of holes alone gives it, metres.
+  double look_at_holes(const GridShape::Block& b, PatchRecord& p, Offer& offer) const {
+    const MaskCells cells(ingest_.masks(), b.level);
+    bool answers = false, differ = false;
+    for (int j = -kExtensionCells; j < kKernelCells + kExtensionCells; ++j)
+      for (int i = -kExtensionCells; i < kKernelCells + kExtensionCells; ++i) {
+        const int x = b.bx * kKernelCells + i, y = b.by * kKernelCells + j;
+        const std::uint8_t c = cells.cell(x, y);
+        differ |= c == CellMasks::kAnswering;
+        const bool inside = i >= 0 && j >= 0 && i < kKernelCells && j < kKernelCells;
+        answers |= inside && (c & CellMasks::kAnswering);
+      }
+    if (!answers) p.flags = 0;
+    if (!answers || !make_holes(cells, b.bx, b.by)) return 0;
+    p.flags |= PatchRecord::kRagged;
+    offer = make_offer(cells, b.bx, b.by);
+    return differ ? std::hypot(grid_.info.frame.step_i(), grid_.info.frame.step_j()) * std::ldexp(1, b.level)
+                  : 0;
+  }
+
+  // The grid joins the others; tops and flags are evaluated for it and for whatever it overlaps.
+  void add_to_state() {
+    db_.grids.push_back(std::move(grid_));
+    const std::size_t added = db_.grids.size() - 1;
+    std::vector<PatchPlace> places;
+    const Extent extent = report_.extent;
+    for (std::size_t g = 0; g < db_.grids.size(); ++g) {
+      const GridInfo& info = db_.grids[g].info;
+      if (!info.frame.bounds(info.shape.footprint()).meets(extent)) continue;
+      for (std::size_t k = 0; k < db_.grids[g].patches.size(); ++k) {
+        if (!db_.grids[g].patches[k].exists()) continue;
+        const GridShape::Block b = info.shape.block(k);
+        if (g == added || info.frame.bounds(info.shape.kernel(b.level, b.bx, b.by)).meets(extent))
+          places.push_back({g, k});
+      }
+    }
+    update(places, added);
+  }
+
+  void update(const std::vector<PatchPlace>& places, std::size_t added) {
+    std::vector<Standing> standings(places.size());
+    tbb::enumerable_thread_specific<CoverageCounts> counts;
+    tbb::parallel_for(size_t(0), places.size(),
+                      [&](std::size_t k) { standings[k] = standing(db_.grids, places[k], counts.local()); });
+    for (const CoverageCounts& c : counts) db_.counts += c;
+    std::vector<std::vector<std::size_t>> changed(db_.grids.size());
+    std::vector<LodTree::Entry> out, in;
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      Grid& g = db_.grids[places[k].grid];
+      PatchRecord& p = g.patches[places[k].index];
+      PatchRecord next = p;
+      next.top = standings[k].top;
+      next.flags = (p.flags & ~std::uint64_t{PatchRecord::kBest}) |
+                   (standings[k].best ? std::uint64_t{PatchRecord::kBest} : 0);
+      const bool is_new = places[k].grid == added;
+      if (next == p && !is_new) continue;
+      if (!is_new && !p.dormant()) out.push_back({lod_box(g, places[k].index), g.patch_id(places[k].index)});
+      report(p, next, is_new);
+      p = next;
+      if (!p.dormant()) in.push_back({lod_box(g, places[k].index), g.patch_id(places[k].index)});
+      changed[places[k].grid].push_back(places[k].index);
+    }
+    change_tree(out, in);
+    write(changed, added);
+  }
+
+  void report(const PatchRecord& before, const PatchRecord& after, bool is_new) {
+    if (is_new) {
+      ++report_.patches, report_.dormant += after.dormant();
+    } else {
+      report_.lowered += after.top < before.top;
+      report_.hidden += after.dormant() && !before.dormant();
+    }
+  }
+
+  void change_tree(const std::vector<LodTree::Entry>& out, const std::vector<LodTree::Entry>& in) {
+    if (double(out.size() + in.size()) < kRebuildShare * double(db_.tree.size())) {
+      for (const LodTree::Entry& e : out) db_.tree.erase(e);
+      for (const LodTree::Entry& e : in) db_.tree.insert(e);
+      return;
+    }
+    std::vector<LodTree::Entry> all;
+    for (const Grid& g : db_.grids)
+      for (std::size_t k = 0; k < g.patches.size(); ++k)
+        if (g.patches[k].exists() && !g.patches[k].dormant()) all.push_back({lod_box(g, k), g.patch_id(k)});
+    db_.tree = LodTree::build(all);
+    repacked_ = true;
+  }
+
+  void write(const std::vector<std::vector<std::size_t>>& changed, std::size_t added) {
+    for (std::size_t g = 0; g < changed.size(); ++g)
+      if (!changed[g].empty())
+        db_.store.put_patches(db_.grids[g], g == added ? std::span<const std::size_t>() : changed[g]);
+    if (!db_.grids[added].offers.empty()) db_.store.put_offers(db_.grids[added]);
+    if (repacked_) db_.store.erase_tree();
+    for (const std::uint32_t page : db_.tree.take_dirty_pages())
+      db_.store.put_tree_page(page + kFirstTreePage, db_.tree.page_bytes(page));
+    for (const std::uint32_t page : db_.tree.take_freed_pages())
+      db_.store.erase_tree_page(page + kFirstTreePage);
+    db_.store.put_tree_page(0, db_.tree.header_bytes());
+    db_.store.set_fact("decided_integer", std::to_string(db_.counts.integer));
+    db_.store.set_fact("decided_interval", std::to_string(db_.counts.interval));
+    db_.store.set_fact("decided_exact", std::to_string(db_.counts.exact));
+  }
+
+  Database::Impl& db_;
+  const ImportOptions& options_;
+  const RasterSource& source_;
+  ImportReport report_;
+  Stopwatch watch_;
+  Ingest ingest_;
+  PatchErrors errors_;
+  Grid grid_;
+  DigestBuilder digest_;
+  double rim_i_ = 0, rim_j_ = 0;
+  bool repacked_ = false;
+};
+
+}  // namespace
+
+ImportReport Database::import(const RasterSource& source, const ImportOptions& options) {
+  const double start = now();
+  for (const Grid& g : impl_->grids)
+    if (g.info.name == options.name)
+      throw Error(source.path(), "the database has a grid named " + options.name + " already",
+                  "give another with --name");
+  Store& store = impl_->store;
+  store.rollback();
+  store.begin_write();
+  try {
+    impl_->load();  // another process may have written since this one looked
+    ImportReport report = Importer(*impl_, source, options).run();
+    const bool keep = !options.dry_run && report.duplicate_of.empty();
+    double committing = now();
+    if (keep) {
+      store.commit();
+    } else {
+      store.rollback();
+      impl_->load();
+    }
+    report.seconds.store += now() - committing;
+    report.seconds.total = now() - start;
+    return report;
+  } catch (...) {
+    store.rollback();
+    impl_->load();
+    throw;
+  }
+}
+
+}  // namespace patchwork

@@ -1,0 +1,309 @@
+#include "db/ingest.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <mutex>
+#include <set>
+
+#include "db/error.h"
+
+namespace patchwork {
+
+namespace {
+
+constexpr int kScanRows = 256;
+constexpr int kMargin = 24;  // rows around a band: stencils of the streamed levels, and filled holes
+constexpr double kCodeRange = 1 << 23;  // codes stay exact in float32, their differences too
+constexpr int kFillRings = 4;
+
+// The exponent of the lowest bit set in a finite number.
+int lowest_bit(double v) {
+  if (v == 0) return 1 << 20;
+  const auto bits = std::bit_cast<std::uint64_t>(v);
+  const int exponent = int(bits >> 52 & 0x7ff);
+  const std::uint64_t mantissa = bits & 0xfffffffffffff;
+  const std::uint64_t full = exponent ? mantissa | 1ull << 52 : mantissa;
+  return std::max(exponent, 1) - 1075 + std::countr_zero(full);
+}
+
+// The rows or columns along an axis of n samples that levels >= kStreamedLevels read.
+std::vector<int> knots_along(int n, int levels) {
+  std::set<int> knots;
+  for (int i = 0; i < n; i += 1 << Ingest::kStreamedLevels) knots.insert(i);
+  for (int l = Ingest::kStreamedLevels; l < levels; ++l) {
+    const LatticeAxis axis(n, l);
+    knots.insert({axis.last, axis.before});
+  }
+  return {knots.begin(), knots.end()};
+}
+
+}  // namespace
+
+CellMasks CellMasks::from_cells(std::vector<std::uint8_t> cells, const GridShape& shape) {
+  CellMasks masks;
+  for (std::uint8_t& c : cells) c = c ? kReal | kAnswering : 0;
+  masks.levels_.push_back({shape.width() - 1, shape.height() - 1, std::move(cells)});
+  for (int l = 1; l < shape.levels(); ++l) {
+    const int cols = shape.lattice_cols(l) - 1, rows = shape.lattice_rows(l) - 1;
+    Level level{cols, rows, std::vector<std::uint8_t>(size_t(cols) * size_t(rows))};
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < cols; ++i) {
+        std::uint8_t all = kReal, any = 0;
+        for (int y = 2 * j; y < std::min(2 * j + 2, masks.rows(l - 1)); ++y)
+          for (int x = 2 * i; x < std::min(2 * i + 2, masks.cols(l - 1)); ++x)
+            all &= masks.at(l - 1, x, y), any |= masks.at(l - 1, x, y);
+        level.cells[size_t(j) * size_t(cols) + size_t(i)] = std::uint8_t(all | (any & kAnswering));
+      }
+    masks.levels_.push_back(std::move(level));
+  }
+  return masks;
+}
+
+Ingest::Ingest(const RasterSource& source, std::size_t memory, const Progress& progress)
+    : source_(source), shape_(source.width(), source.height(), source.pixel_is_area()) {
+  const std::size_t samples = size_t(shape_.width()) * size_t(shape_.height());
+  const int chunk_rows = kChunkVertices << (kStreamedLevels - 1);
+  if (source.float_is_exact() && samples * sizeof(float) <= memory / 4) {
+    kept_.resize(samples);
+    band_rows_ = (shape_.height() + chunk_rows - 1) / chunk_rows * chunk_rows;
+  } else {  // a row of a band costs its code, its raw form, its mask and a third for the levels made of it
+    const std::size_t row_bytes = size_t(shape_.width()) * 24;
+    band_rows_ =
+        int(std::clamp<std::size_t>(memory / 4 / row_bytes / size_t(chunk_rows), 1, 64)) * chunk_rows;
+  }
+  knot_cols_ = knots_along(shape_.width(), shape_.levels());
+  knot_rows_ = knots_along(shape_.height(), shape_.levels());
+  knots_.resize(knot_cols_.size() * knot_rows_.size());
+  means_cols_ = (shape_.width() + 7) / 8, means_rows_ = (shape_.height() + 7) / 8;
+  means_.resize(size_t(means_cols_) * size_t(means_rows_));
+  scan(progress);
+  if (!(low_ <= high_)) throw Error(source.path(), "it holds no data: every sample is nodata");
+  choose_quantiser();
+  if (!cells_.empty()) {
+    fill_means();
+    masks_ = CellMasks::from_cells(std::move(cells_), shape_);
+    if (masks_.at(shape_.levels() - 1, 0, 0) == 0 && shape_.levels() == 1 && shape_.width() == 2)
+      throw Error(source.path(), "it holds no cell with data at all four corners");
+  }
+  make_coarse();
+}
+
+void Ingest::scan(const Progress& progress) {
+  low_ = INFINITY, high_ = -INFINITY;
+  std::vector<double> buffer;
+  for (int y = 0; y < shape_.height(); y += kScanRows) {
+    const int rows = std::min(kScanRows, shape_.height() - y);
+    const std::size_t n = size_t(rows) * size_t(shape_.width());
+    if (!kept_.empty()) {
+      float* raw = kept_.data() + size_t(y) * size_t(shape_.width());
+      source_.read_rows(y, rows, std::span<float>(raw, n));
+      scan_rows(y, rows, raw);
+    } else {
+      buffer.resize(n);
+      source_.read_rows(y, rows, std::span<double>(buffer));
+      scan_rows(y, rows, buffer.data());
+    }
+    if (progress) progress(double(y + rows) / shape_.height());
+  }
+}
+
+template <class Raw>
+void Ingest::scan_rows(int y, int rows, const Raw* raw) {
+  const int w = shape_.width();
+  const bool integers = source_.integer_samples();
+  std::mutex mutex;
+  bool holes = false;
+  tbb::parallel_for(0, (rows + 7) / 8, [&](int octet) {
+    double low = INFINITY, high = -INFINITY;
+    int bit = 1 << 20;
+    bool nan = false;
+    double* means = means_.data() + (size_t(y) / 8 + size_t(octet)) * size_t(means_cols_);
+    std::vector<int> counts(static_cast<size_t>(means_cols_));
+    for (int r = octet * 8; r < std::min(rows, octet * 8 + 8); ++r) {
+      const Raw* row = raw + size_t(r) * size_t(w);
+      for (int i = 0; i < w; ++i) {
+        const double v = row[i];
+        if (v != v) {
+          nan = true;
+          continue;
+        }
+        low = v < low ? v : low, high = v > high ? v : high;
+        means[i >> 3] += v, ++counts[size_t(i) >> 3];
+        if (!integers) bit = std::min(bit, lowest_bit(v));
+      }
+      const auto knot = std::lower_bound(knot_rows_.begin(), knot_rows_.end(), y + r);
+      if (knot != knot_rows_.end() && *knot == y + r) {
+        double* out = knots_.data() + size_t(knot - knot_rows_.begin()) * knot_cols_.size();
+        for (const int c : knot_cols_) *out++ = row[c];
+      }
+    }
+    for (int i = 0; i < means_cols_; ++i) means[i] /= counts[size_t(i)];  // NaN where none is valid
+    const std::lock_guard lock(mutex);
+    low_ = std::min(low_, low), high_ = std::max(high_, high), finest_bit_ = std::min(finest_bit_, bit);
+    holes |= nan;
+  });
+  if (cells_.empty() && !holes) return;
+  std::vector<std::uint8_t> valid(size_t(rows) * size_t(w));
+  for (std::size_t k = 0; k < valid.size(); ++k) valid[k] = raw[k] == raw[k];
+  note_cells(y, rows, valid);
+}
+
+void Ingest::note_cells(int y, int rows, const std::vector<std::uint8_t>& valid) {
+  const std::size_t w = size_t(shape_.width());
+  if (cells_.empty()) {
+    cells_.assign((w - 1) * size_t(shape_.height() - 1), 1);
+    last_row_valid_.assign(w, 1);
+  }
+  for (int r = 0; r < rows; ++r) {
+    const std::uint8_t* v = valid.data() + size_t(r) * w;
+    if (y + r > 0) {
+      std::uint8_t* cells = cells_.data() + size_t(y + r - 1) * (w - 1);
+      for (std::size_t i = 0; i + 1 < w; ++i)
+        cells[i] = last_row_valid_[i] & last_row_valid_[i + 1] & v[i] & v[i + 1];
+    }
+    last_row_valid_.assign(v, v + w);
+  }
+}
+
+void Ingest::choose_quantiser() {
+  const double range = high_ - low_;
+  const double fits = std::exp2(std::ceil(std::log2(std::max(range, 1e-300) / kCodeRange)));
+  if (source_.integer_samples()) {
+    quantiser_.quantum = std::max(1.0, fits);
+  } else {
+    // Exact if that costs at most 64 codes for each accuracy; else 16 codes for each, which adds 1/32 of it.
+    const double accuracy = source_.accuracy() / std::abs(source_.scale());
+    const double exact = std::ldexp(1, std::clamp(finest_bit_, -60, 60));
+    const double coarse = accuracy > 0 ? std::exp2(std::floor(std::log2(accuracy / 16))) : fits;
+    quantiser_.quantum = exact >= fits && exact * 4 >= coarse ? exact : std::max(coarse, fits);
+  }
+  const bool exact = quantiser_.quantum <= (source_.integer_samples() ? 1.0 : std::ldexp(1, finest_bit_));
+  quantiser_.error = exact ? 0 : quantiser_.quantum / 2;
+  const double largest = std::max(std::abs(low_), std::abs(high_)) / quantiser_.quantum;
+  if (largest >= kCodeRange)
+    quantiser_.origin = std::int64_t(std::floor((low_ + range / 2) / quantiser_.quantum));
+}
+
+double Ingest::code_of(double raw) const {
+  return std::nearbyint(raw / quantiser_.quantum) - double(quantiser_.origin);
+}
+
+// Means of 8 x 8 samples; where there are none, those of the smallest square of 16, 32, ... that has any.
+void Ingest::fill_means() {
+  struct Plane {
+    int cols, rows;
+    std::vector<double> v;
+  };
+  std::vector<Plane> up{{means_cols_, means_rows_, means_}};
+  while (up.back().cols > 1 || up.back().rows > 1) {
+    const Plane& fine = up.back();
+    Plane coarse{(fine.cols + 1) / 2, (fine.rows + 1) / 2, {}};
+    for (int j = 0; j < coarse.rows; ++j)
+      for (int i = 0; i < coarse.cols; ++i) {
+        double sum = 0, count = 0;
+        for (int y = 2 * j; y < std::min(2 * j + 2, fine.rows); ++y)
+          for (int x = 2 * i; x < std::min(2 * i + 2, fine.cols); ++x)
+            if (const double v = fine.v[size_t(y) * size_t(fine.cols) + size_t(x)]; v == v) sum += v, ++count;
+        coarse.v.push_back(sum / count);
+      }
+    up.push_back(std::move(coarse));
+  }
+  for (std::size_t p = up.size() - 1; p-- > 0;)
+    for (int j = 0; j < up[p].rows; ++j)
+      for (int i = 0; i < up[p].cols; ++i)
+        if (double& v = up[p].v[size_t(j) * size_t(up[p].cols) + size_t(i)]; v != v)
+          v = up[p + 1].v[size_t(j / 2) * size_t(up[p + 1].cols) + size_t(i / 2)];
+  means_ = std::move(up[0].v);
+}
+
+double Ingest::knot(int i, int j) const {
+  const auto place = [](const std::vector<int>& knots, int at) {
+    const std::size_t guess = size_t(at) / 8;
+    if (guess < knots.size() && knots[guess] == at) return guess;
+    return size_t(std::lower_bound(knots.begin(), knots.end(), at) - knots.begin());
+  };
+  const double raw = knots_[place(knot_rows_, j) * knot_cols_.size() + place(knot_cols_, i)];
+  return code_of(raw == raw ? raw : means_[size_t(j / 8) * size_t(means_cols_) + size_t(i / 8)]);
+}
+
+void Ingest::make_coarse() {
+  for (int l = kStreamedLevels; l < shape_.levels(); ++l)
+    coarse_.push_back(
+        make_lattice(shape_, l, 0, shape_.lattice_rows(l), [&](int i, int j) { return knot(i, j); }));
+  knots_ = {};
+}
+
+// The vertices next to data continue them linearly, so that an interpolant's slope there is that of the data;
+// what lies deeper is the mean of its neighbours, ring by ring, then the mean of a neighbourhood.
+void Ingest::fill_holes(std::vector<float>& codes, std::span<const std::uint8_t> valid, int first,
+                        int rows) const {
+  const int w = shape_.width();
+  std::vector<std::uint8_t> ring(valid.begin(), valid.end());  // 1: has a value
+  const auto has = [&](int i, int j) {
+    return i >= 0 && i < w && j >= 0 && j < rows && ring[size_t(j) * size_t(w) + size_t(i)];
+  };
+  const auto at = [&](int i, int j) -> double { return codes[size_t(j) * size_t(w) + size_t(i)]; };
+  std::vector<std::pair<std::size_t, float>> found;
+  for (int sweep = 0; sweep < kFillRings; ++sweep) {
+    found.clear();
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < w; ++i) {
+        if (has(i, j)) continue;
+        double sum = 0;
+        int count = 0;
+        for (int dj = -1; dj <= 1; ++dj)
+          for (int di = -1; di <= 1; ++di) {
+            if (!has(i + di, j + dj)) continue;
+            const bool slope = sweep == 0 && has(i + 2 * di, j + 2 * dj);
+            sum += slope ? 2 * at(i + di, j + dj) - at(i + 2 * di, j + 2 * dj) : at(i + di, j + dj), ++count;
+          }
+        if (count) found.emplace_back(size_t(j) * size_t(w) + size_t(i), float(std::nearbyint(sum / count)));
+      }
+    for (const auto& [k, v] : found) codes[k] = v, ring[k] = 1;
+  }
+  for (int j = 0; j < rows; ++j)
+    for (int i = 0; i < w; ++i)
+      if (!has(i, j))
+        codes[size_t(j) * size_t(w) + size_t(i)] =
+            float(code_of(means_[size_t((first + j) / 8) * size_t(means_cols_) + size_t(i / 8)]));
+}
+
+Ingest::Band Ingest::read_band(int y0, int y1) const {
+  const int w = shape_.width(), first = std::max(0, y0 - kMargin),
+            end = std::min(shape_.height(), y1 + kMargin);
+  const std::size_t n = size_t(end - first) * size_t(w);
+  std::vector<float> codes(n);
+  Band band{y0, y1, {}, {}};
+  if (!masks_.empty()) band.valid.resize(n);
+  const auto take = [&](const auto* raw) {
+    tbb::parallel_for(size_t(0), size_t(end - first), [&](std::size_t r) {
+      for (std::size_t k = r * size_t(w); k < (r + 1) * size_t(w); ++k) {
+        codes[k] = float(code_of(raw[k]));
+        if (!band.valid.empty()) band.valid[k] = raw[k] == raw[k];
+      }
+    });
+  };
+  if (!kept_.empty()) {
+    take(kept_.data() + size_t(first) * size_t(w));
+  } else {
+    std::vector<double> raw(n);
+    source_.read_rows(first, end - first, std::span<double>(raw));
+    take(raw.data());
+  }
+  if (!band.valid.empty()) fill_holes(codes, band.valid, first, end - first);
+  for (int l = 0; l < std::min(kStreamedLevels, shape_.levels()); ++l) {
+    // Every level row whose samples are at hand; the one beyond the last sample needs the last and one
+    // before.
+    const int from = (first + (1 << l) - 1) >> l;
+    const int to = end == shape_.height() ? shape_.lattice_rows(l) : ((end - 1) >> l) + 1;
+    band.levels.push_back(make_lattice(shape_, l, from, to - from, [&](int i, int j) {
+      return codes[size_t(j - first) * size_t(w) + size_t(i)];
+    }));
+  }
+  return band;
+}
+
+}  // namespace patchwork

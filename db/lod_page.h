@@ -1,0 +1,73 @@
+// One page of the R-tree: up to 64 boxes in a structure of arrays, compared in vectors.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "db/frame.h"
+#include "db/patch_id.h"
+
+namespace patchwork {
+
+/// An upright box of LOD space: bounds of the footprint times the error interval [bottom, top), metres.
+struct LodBox {
+  double xmin, ymin, xmax, ymax;
+  float bottom, top;
+  bool operator==(const LodBox&) const = default;
+  /// Finite sides, each minimum at most its maximum, 0 <= bottom <= top; top may be infinite.
+  bool sound() const;
+};
+
+/// A box and whose it is.
+struct LodEntry {
+  LodBox box;
+  PatchId id;
+  bool operator==(const LodEntry&) const = default;
+};
+
+/// The smallest box around both.
+LodBox united(const LodBox& a, const LodBox& b);
+bool contains(const LodBox& outer, const LodBox& inner);
+/// An error (metres, 0 to infinity) on a scale of octaves, in which one step counts the same anywhere:
+/// piecewise linear between powers of two, finite at both ends.
+float error_octaves(float error);
+/// The largest float that is not above `error`.
+float float_at_most(double error);
+
+/// Slots [0, count) are in use. In a leaf (level 0) an entry's id is a patch, elsewhere the index of a page.
+struct LodPage {
+  static constexpr std::uint32_t kSlots = 64;     ///< a visit keeps its hits in one 64-bit mask
+  static constexpr std::uint32_t kMinSlots = 24;  ///< of every page but the root
+  static constexpr std::uint32_t kFree = 0xffff;  ///< the level of a page that is not in use
+
+  double xmin[kSlots], ymin[kSlots], xmax[kSlots], ymax[kSlots];
+  float bottom[kSlots], top[kSlots];
+  std::uint64_t ref[kSlots];
+  std::uint32_t level = kFree, count = 0;
+
+  explicit LodPage(std::uint32_t page_level = kFree);
+  LodBox box(std::uint32_t s) const { return {xmin[s], ymin[s], xmax[s], ymax[s], bottom[s], top[s]}; }
+  LodEntry entry(std::uint32_t s) const { return {box(s), {ref[s]}}; }
+  std::uint32_t child(std::uint32_t s) const { return std::uint32_t(ref[s]); }
+  void set_box(std::uint32_t s, const LodBox& b);
+  void append(const LodEntry& e);  ///< REQUIRES: count < kSlots
+  void remove(std::uint32_t s);    ///< the last entry takes its place
+  LodBox bounds() const;           ///< REQUIRES: count > 0
+
+  /// Bit s is set if box s meets the closed region and bottom <= error < top.
+  std::uint64_t uniform_hits(const Extent& region, float error) const;
+  /// The box that grows least (volume, errors in octaves) when `box` joins it; ties by the smaller volume.
+  std::uint32_t choose_slot(const LodBox& box) const;
+  /// Keeps one part of its entries and `extra`, returns the other part. REQUIRES: count == kSlots.
+  LodPage split(const LodEntry& extra);
+
+  /// Fixed little-endian bytes (see lod_page.cpp), and back; `problem` says what is wrong with hostile ones.
+  std::vector<std::byte> bytes() const;
+  static LodPage from_bytes(std::span<const std::byte> bytes, std::string& problem);
+};
+
+}  // namespace patchwork

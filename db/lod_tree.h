@@ -1,0 +1,150 @@
+// The R-tree over LOD space: boxes (x, y, error) in flat pages, built in bulk or changed one by one.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "db/lod_page.h"
+
+namespace patchwork {
+
+/// What a visit touched: pages, and boxes compared in them (those of nodes and of entries).
+struct VisitCost {
+  std::size_t nodes = 0, boxes = 0;
+};
+
+/// Keeps entries (each box sound, ids need not differ). Many may read at once; who changes it must be alone.
+class LodTree {
+ public:
+  static constexpr std::uint32_t kMaxHeight = 12;
+
+  using Entry = LodEntry;
+  struct Shape {
+    int height = 1;         ///< levels of pages; 1 if the root is a leaf
+    std::size_t nodes = 0;  ///< pages in use
+    double fill = 0;        ///< mean share of used slots
+  };
+  /// A page as it was stored: its index and what `page_bytes` gave.
+  struct StoredPage {
+    std::uint32_t index;
+    std::span<const std::byte> bytes;
+  };
+
+  LodTree();
+  /// The same tree, page by page, for the same entries in the same order.
+  static LodTree build(const std::vector<Entry>& entries);
+  /// From what `header_bytes` and `page_bytes` gave (pages in any order). Throws Error if that is no sound
+  /// tree.
+  static LodTree from_pages(std::span<const std::byte> header, std::span<const StoredPage> pages);
+
+  /// REQUIRES: entry.box.sound().
+  void insert(const Entry& entry);
+  /// Takes out one entry equal to this; false if there is none.
+  bool erase(const Entry& entry);
+  std::size_t size() const { return size_; }
+  Shape shape() const;
+
+  /// Calls emit(const Entry&) for every entry that meets(const LodBox&) accepts. Allocates nothing.
+  /// REQUIRES: a box that contains an accepted box is accepted. CAVEAT: `emit` must not change the tree.
+  template <class Meets, class Emit>
+  VisitCost traverse(Meets meets, Emit emit) const {
+    return walk([&](const LodPage& page) { return hits(page, meets); }, emit);
+  }
+
+  /// The same for a uniform cut: boxes that meet the closed region, with bottom <= error < top.
+  template <class Emit>
+  VisitCost visit_uniform(const Extent& region, double error, Emit emit) const {
+    const float limit = float_at_most(error);
+    return walk([&](const LodPage& page) { return page.uniform_hits(region, limit); }, emit);
+  }
+
+  /// Pages written since the last call (or since the tree began), ascending, and those given up since.
+  std::vector<std::uint32_t> take_dirty_pages() { return take_marked(kDirty); }
+  std::vector<std::uint32_t> take_freed_pages() { return take_marked(kFreed); }
+  /// REQUIRES: the page is in use, as those of `take_dirty_pages` are.
+  std::vector<std::byte> page_bytes(std::uint32_t index) const { return pages_[index].bytes(); }
+  /// Changes with every insertion and removal; the format stands in lod_tree_pages.cpp.
+  std::vector<std::byte> header_bytes() const;
+
+  /// "" if every invariant holds, else what is broken first.
+  std::string find_violation() const;
+
+ private:
+  enum Mark : std::uint8_t { kDirty = 1, kFreed = 2 };
+  struct Step {
+    std::uint32_t page, slot;
+  };
+  // The way from the root (first) to a page; `slot` is the one taken, or found in the last page.
+  struct Path {
+    Step steps[kMaxHeight];
+    std::uint32_t length = 0;
+  };
+  struct Orphan {
+    Entry entry;
+    std::uint32_t level;
+  };
+
+  template <class Meets>
+  static std::uint64_t hits(const LodPage& page, Meets& meets) {
+    std::uint64_t mask = 0;
+    for (std::uint32_t s = 0; s < page.count; ++s) mask |= std::uint64_t{bool(meets(page.box(s)))} << s;
+    return mask;
+  }
+  template <class Hits, class Emit>
+  VisitCost walk(Hits hits, Emit& emit) const;
+
+  static std::size_t most_pages(std::size_t in_use);
+  std::uint32_t add_page(const LodPage& page);
+  void release(std::uint32_t page);
+  std::vector<Entry> pack(const std::vector<Entry>& entries, std::uint32_t level);
+  void insert_at(const Entry& entry, std::uint32_t level);
+  void grow_root(const Entry& sibling);
+  bool find(std::uint32_t page, const Entry& entry, Path& path) const;
+  std::vector<Orphan> condense(const Path& path);
+  void shrink_root();
+  void repack();
+  std::vector<std::uint32_t> take_marked(Mark mark);
+  std::string find_violation_below(std::uint32_t page, std::vector<bool>& seen, std::size_t& entries) const;
+
+  std::vector<LodPage> pages_;
+  std::vector<std::uint8_t>
+      marks_;  // one a page, and one for each page cut off at the end since they were taken
+  std::vector<std::uint32_t> free_;
+  std::uint32_t root_ = 0;
+  std::size_t size_ = 0;
+};
+
+template <class Hits, class Emit>
+VisitCost LodTree::walk(Hits hits, Emit& emit) const {
+  struct Level {
+    const LodPage* page;
+    std::uint64_t left;
+  } stack[kMaxHeight];
+  VisitCost cost;
+  std::uint32_t depth = 0;
+  const auto enter = [&](const LodPage& page) {
+    ++cost.nodes, cost.boxes += page.count;
+    stack[depth++] = {&page, hits(page)};
+  };
+  enter(pages_[root_]);
+  while (depth > 0) {
+    Level& top = stack[depth - 1];
+    if (top.left == 0) {
+      --depth;
+      continue;
+    }
+    const auto slot = std::uint32_t(std::countr_zero(top.left));
+    top.left &= top.left - 1;
+    if (top.page->level == 0)
+      emit(top.page->entry(slot));
+    else
+      enter(pages_[top.page->child(slot)]);
+  }
+  return cost;
+}
+
+}  // namespace patchwork

@@ -1,0 +1,55 @@
+#include "db/payload.h"
+
+#include <algorithm>
+
+#include "db/codec.h"
+
+namespace patchwork {
+
+namespace {
+constexpr std::size_t kHeader = 8;
+constexpr std::byte kMagic{'C'}, kVersion{1};
+}  // namespace
+
+Chunk make_chunk(const GridShape& shape, int level, int cx, int cy) {
+  const int cols = std::min(kChunkVertices, shape.lattice_cols(level) - cx * kChunkVertices);
+  const int rows = std::min(kChunkVertices, shape.lattice_rows(level) - cy * kChunkVertices);
+  return {cols, rows, {}, {}};
+}
+
+std::vector<std::byte> encode_chunk(const Chunk& chunk) {
+  std::vector<std::byte> codes = encode_codes(chunk.codes, chunk.cols, chunk.rows);
+  std::vector<std::byte> out{kMagic, kVersion, std::byte(!chunk.cells.empty()), std::byte{0}};
+  for (int shift = 0; shift < 32; shift += 8) out.push_back(std::byte(codes.size() >> shift & 0xff));
+  out.insert(out.end(), codes.begin(), codes.end());
+  if (!chunk.cells.empty()) {
+    const std::vector<std::int32_t> cells(chunk.cells.begin(), chunk.cells.end());
+    codes = encode_codes(cells, chunk.cols, chunk.rows);
+    out.insert(out.end(), codes.begin(), codes.end());
+  }
+  return out;
+}
+
+std::string decode_chunk(std::span<const std::byte> bytes, Chunk& chunk) {
+  if (bytes.size() < kHeader || bytes[0] != kMagic) return "not a payload chunk";
+  if (bytes[1] != kVersion) return "a payload of an unknown version";
+  std::size_t length = 0;
+  for (int k = 0; k < 4; ++k) length |= std::size_t(bytes[size_t(4 + k)]) << (8 * k);
+  if (length > bytes.size() - kHeader) return "a payload that ends early";
+  const std::size_t n = size_t(chunk.cols) * size_t(chunk.rows);
+  chunk.codes.resize(n), chunk.cells.clear();
+  const auto rest = bytes.subspan(kHeader);
+  if (std::string bad = decode_codes(rest.first(length), chunk.cols, chunk.rows, chunk.codes); !bad.empty())
+    return bad;
+  if (bytes[2] == std::byte{0}) return length == rest.size() ? "" : "a payload with bytes left over";
+  std::vector<std::int32_t> cells(n);
+  if (std::string bad = decode_codes(rest.subspan(length), chunk.cols, chunk.rows, cells); !bad.empty())
+    return bad;
+  for (const std::int32_t c : cells) {
+    if (c < 0 || c > 3) return "a payload with an impossible cell mask";
+    chunk.cells.push_back(std::uint8_t(c));
+  }
+  return "";
+}
+
+}  // namespace patchwork

@@ -1,0 +1,161 @@
+#include "db/raster.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "db/raster_impl.h"
+
+namespace patchwork {
+
+using raster_impl::RawGrid;
+
+namespace {
+
+// What a RasterSource answers; gathered from the file's grid, then changed by a warp.
+struct Facts {
+  std::string path, crs;
+  int width = 0, height = 0;
+  Frame frame;
+  bool pixel_is_area = true, integer_samples = false, float_is_exact = false;
+  double accuracy = 0, scale = 1, offset = 0;
+  int sample_bytes = 1;
+  std::vector<std::string> warnings;
+  std::unique_ptr<raster_impl::Rows> rows;
+};
+
+std::string metres(double v) {
+  char text[40];
+  std::snprintf(text, sizeof text, v < 0.01 ? "%.2g m" : "%.2f m", v);
+  return text;
+}
+
+// Rounded up, so that the figure a person reads is never below the one that is added.
+std::string metres_up(double v) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.2f m", std::ceil(v * 100) / 100);
+  return text;
+}
+
+std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+// Every value of these types is a float: integers of up to 16 bits, and floats.
+bool fits_float(GDALDataType type) {
+  return type == GDT_Float32 || (GDALDataTypeIsInteger(type) && GDALGetDataTypeSizeBytes(type) <= 2);
+}
+
+Facts describe(const RawGrid& raw) {
+  Facts f;
+  f.path = raw.path;
+  f.width = raw.width;
+  f.height = raw.height;
+  f.pixel_is_area = raw.pixel_is_area;
+  f.integer_samples = GDALDataTypeIsInteger(raw.type);
+  f.float_is_exact = fits_float(raw.type);
+  f.scale = raw.scale;
+  f.offset = raw.offset;
+  f.sample_bytes = GDALGetDataTypeSizeBytes(raw.type);
+  f.warnings = raw.warnings;
+  return f;
+}
+
+// Replaces the grid by its warped form; returns what that may cost, metres.
+double warp_into(Facts& f, RawGrid& raw, const OGRSpatialReference& target) {
+  auto warped = raster_impl::warp(raw, target);
+  const double cost = warped.cost * std::abs(raw.scale);
+  f.warnings.push_back("warped from " + raster_impl::crs_label(*raw.crs) + " to " +
+                       raster_impl::crs_label(target) + ", " + size_text(raw.width, raw.height) + " to " +
+                       size_text(warped.width, warped.height) + " samples; " + metres_up(cost) +
+                       " added to its accuracy");
+  f.integer_samples = f.float_is_exact = false;
+  f.width = warped.width;
+  f.height = warped.height;
+  raw.geotransform = warped.geotransform;
+  raw.rows = std::move(warped.rows);
+  return cost;
+}
+
+// `quantum`: metres between the file's neighbouring values, 0 for floats; a warp does not undo it.
+double assumed_accuracy(Facts& f, double quantum) {
+  const double step = (f.frame.step_i() + f.frame.step_j()) / 2;
+  const double assumed = std::max(quantum / 2, kDefaultAccuracyPerStep * step);
+  f.warnings.push_back("no accuracy given: taken as " + metres(assumed) +
+                       " (half a raw unit of integers, at least 2 % of the step); better give --accuracy");
+  return assumed;
+}
+
+// From the file's grid to the database's: CRS, warp, accuracy.
+Facts finish(RawGrid raw, const RasterOptions& options, const std::string& database_crs) {
+  if (raw.width < 2 || raw.height < 2)
+    throw Error(raw.path, "is a grid of " + size_text(raw.width, raw.height) + " samples",
+                "a surface needs at least 2 x 2");
+  raw.frame();  // a sheared or degenerate file is refused before its heights are read
+  const auto target = raster_impl::domain_crs(raw, database_crs);
+  Facts f = describe(raw);
+  if (target) f.crs = raster_impl::to_wkt2(*target);
+  const double quantum = f.integer_samples ? std::abs(f.scale) : 0;
+  double cost = 0;
+  if (target && raw.crs && !raster_impl::same_crs(*raw.crs, *target)) cost = warp_into(f, raw, *target);
+  f.frame = raw.frame();
+  f.accuracy = cost + (options.accuracy ? *options.accuracy : assumed_accuracy(f, quantum));
+  f.rows = std::move(raw.rows);
+  return f;
+}
+
+}  // namespace
+
+struct RasterSource::Impl : Facts {};
+
+RasterSource RasterSource::open(const std::string& path, const RasterOptions& options,
+                                const std::string& database_crs) {
+  const raster_impl::GdalMessages quiet;
+  raster_impl::check_options(options);
+  return RasterSource(
+      std::unique_ptr<Impl>(new Impl{finish(raster_impl::open_raw(path, options), options, database_crs)}));
+}
+
+RasterSource RasterSource::open_joined(const std::vector<std::string>& paths, const RasterOptions& options,
+                                       const std::string& database_crs) {
+  const raster_impl::GdalMessages quiet;
+  if (paths.empty()) throw Error("join", "no files given", "name at least one");
+  raster_impl::check_options(options);
+  return RasterSource(
+      std::unique_ptr<Impl>(new Impl{finish(raster_impl::join_raw(paths, options), options, database_crs)}));
+}
+
+RasterSource::RasterSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+RasterSource::RasterSource(RasterSource&&) noexcept = default;
+RasterSource& RasterSource::operator=(RasterSource&&) noexcept = default;
+RasterSource::~RasterSource() = default;
+
+const std::string& RasterSource::path() const { return impl_->path; }
+int RasterSource::width() const { return impl_->width; }
+int RasterSource::height() const { return impl_->height; }
+const Frame& RasterSource::frame() const { return impl_->frame; }
+bool RasterSource::pixel_is_area() const { return impl_->pixel_is_area; }
+const std::string& RasterSource::crs() const { return impl_->crs; }
+double RasterSource::accuracy() const { return impl_->accuracy; }
+bool RasterSource::integer_samples() const { return impl_->integer_samples; }
+double RasterSource::scale() const { return impl_->scale; }
+double RasterSource::offset() const { return impl_->offset; }
+const std::vector<std::string>& RasterSource::warnings() const { return impl_->warnings; }
+int RasterSource::sample_bytes() const { return impl_->sample_bytes; }
+bool RasterSource::float_is_exact() const { return impl_->float_is_exact; }
+
+void RasterSource::read_rows(int row, int rows, std::span<double> out) const {
+  assert(row >= 0 && rows >= 0 && row <= height() - rows);
+  assert(out.size() >= static_cast<std::size_t>(rows) * static_cast<std::size_t>(width()));
+  if (rows > 0) impl_->rows->read(row, rows, out.data());
+}
+
+void RasterSource::read_rows(int row, int rows, std::span<float> out) const {
+  assert(row >= 0 && rows >= 0 && row <= height() - rows && float_is_exact());
+  assert(out.size() >= static_cast<std::size_t>(rows) * static_cast<std::size_t>(width()));
+  if (rows > 0) impl_->rows->read(row, rows, out.data());
+}
+
+}  // namespace patchwork

@@ -1,0 +1,31 @@
+// Where a question is asked: everywhere, in an upright rectangle, or in a polygon.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "db/grid.h"
+
+namespace patchwork {
+
+/// A closed region of the domain. Copies are cheap enough to pass by value.
+class Region {
+ public:
+  Region() = default;  ///< everywhere
+  static Region inside(const Extent& extent);
+  /// A simple polygon by its corners, in either turn. Throws Error: fewer than three corners, not finite.
+  static Region inside(std::vector<Point> corners);
+  /// Reads "x y, x y, ..." or "POLYGON((x y, ...))". Throws Error.
+  static Region parse_polygon(const std::string& text);
+
+  const Extent& bounds() const { return bounds_; }
+  /// Does the domain of a patch meet the region?
+  bool meets(const Grid& grid, const GridShape::Block& block) const;
+
+ private:
+  Extent bounds_{-1e300, -1e300, 1e300, 1e300};
+  std::vector<Point> corners_;  // of a polygon; empty for a rectangle
+};
+
+}  // namespace patchwork

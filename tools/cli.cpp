@@ -1,0 +1,102 @@
+#include "tools/cli.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+namespace patchwork::cli {
+
+CLI::App* verb(CLI::App& app, Common& common, const std::string& name, const std::string& what) {
+  CLI::App* v = app.add_subcommand(name, what);
+  v->add_flag("--quiet", common.quiet, "no progress and no notes");
+  v->add_option("--memory", common.memory, "memory to use, e.g. 512MiB or 2GiB")
+      ->transform(CLI::AsSizeValue(false))
+      ->default_str("1GiB");
+  v->add_option("--threads", common.threads, "threads to use; 0 means all cores")->check(CLI::Range(0, 1024));
+  return v;
+}
+
+ProgressBar::ProgressBar(const Common& common, std::string label, double total, std::string unit)
+    : label_(std::move(label)),
+      unit_(std::move(unit)),
+      total_(total),
+      active_(!common.quiet && isatty(STDERR_FILENO)),
+      start_(std::chrono::steady_clock::now()),
+      last_(start_) {}
+
+ProgressBar::~ProgressBar() {
+  if (shown_) std::fputs("\r\033[K", stderr);
+}
+
+void ProgressBar::show(double share) {
+  const auto now = std::chrono::steady_clock::now();
+  const double elapsed = std::chrono::duration<double>(now - start_).count();
+  if (!active_ || elapsed < 1 || std::chrono::duration<double>(now - last_).count() < 0.1) return;
+  last_ = now, shown_ = true;
+  constexpr int width = 30;
+  const int filled = int(std::lround(share * width));
+  const std::string rate = unit_.empty() ? "" : fmt::format(" {:.1f} {}/s", share * total_ / elapsed, unit_);
+  const double left = share > 0 ? elapsed * (1 - share) / share : 0;
+  const std::string line = fmt::format("\r\033[K{} [{:=<{}}{: <{}}] {:3.0f} %{} {:.0f} s left", label_, "",
+                                       filled, "", width - filled, 100 * share, rate, left);
+  std::fputs(line.c_str(), stderr);
+}
+
+void SurfaceOptions::add_to(CLI::App& v) {
+  v.add_option("--error", error, "largest error that you accept, metres; 0 means the best there is");
+  v.add_option("--smoothness", smoothness, "k: derivatives that are continuous")->check(CLI::Range(0, 2));
+  v.add_option("--blend", blend, "how patches are composed")->check(CLI::IsMember({"priority", "weighted"}));
+  v.add_option("--engine", engine, "where the surface is evaluated")->check(CLI::IsMember({"cpu"}));
+  v.add_flag("--strict", strict, "no data where the error is not available, instead of the best there is");
+}
+
+BlendOptions SurfaceOptions::blend_options() const {
+  return {.smoothness = smoothness,
+          .composition = blend == "weighted" ? Composition::weighted : Composition::priority,
+          .strict = strict,
+          .error = error};
+}
+
+void RegionOptions::add_to(CLI::App& v, bool with_polygon) {
+  auto* box = v.add_option("--extent", extent, "xmin ymin xmax ymax, in the database's CRS")->expected(4);
+  if (with_polygon) v.add_option("--polygon", polygon, "\"x y, x y, x y\" or WKT")->excludes(box);
+}
+
+Region RegionOptions::region() const {
+  if (!polygon.empty()) return Region::parse_polygon(polygon);
+  if (extent.size() == 4) return Region::inside(Extent{extent[0], extent[1], extent[2], extent[3]});
+  return {};
+}
+
+void print(const Json& document) { fmt::print("{}\n", document.dump(2)); }
+
+void note(const Common& common, const std::string& text) {
+  if (!common.quiet) fmt::print(stderr, "{}\n", text);
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+Json to_json(const Extent& e) { return {e.xmin, e.ymin, e.xmax, e.ymax}; }
+
+Json by_level(const Extraction& x) {
+  std::map<int, std::size_t> counts;
+  for (const PatchId id : x.patches) ++counts[id.level()];
+  Json out = Json::object();
+  for (const auto& [level, n] : counts) out[std::to_string(level)] = n;
+  return out;
+}
+
+Json by_grid(const Database& db, const Extraction& x) {
+  std::map<GridId, std::size_t> counts;
+  for (const PatchId id : x.patches) ++counts[id.grid()];
+  Json out = Json::object();
+  for (const auto& [grid, n] : counts) out[db.grid(grid).info.name] = n;
+  return out;
+}
+
+}  // namespace patchwork::cli

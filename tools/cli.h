@@ -1,0 +1,84 @@
+// What every verb of the command shares: options, one JSON document on stdout, progress on stderr.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "blend/blend.h"
+#include "db/database.h"
+#include "query/extract.h"
+
+namespace patchwork::cli {
+
+using Json = nlohmann::ordered_json;
+
+/// Options that stand on every verb.
+struct Common {
+  bool json = false, quiet = false;
+  std::uint64_t memory = kDefaultMemory;  ///< bytes
+  int threads = 0;                        ///< 0: all
+};
+
+/// A verb: adds its subcommand; the callback that it sets does the work and throws Error.
+void add_import(CLI::App& app, Common& common);
+void add_list(CLI::App& app, Common& common);
+void add_info(CLI::App& app, Common& common);
+void add_query(CLI::App& app, Common& common);
+void add_sample(CLI::App& app, Common& common);
+void add_resample(CLI::App& app, Common& common);
+void add_bench(CLI::App& app, Common& common);
+
+/// A subcommand with the common options.
+CLI::App* verb(CLI::App& app, Common& common, const std::string& name, const std::string& what);
+
+/// A bar with share, rate and remaining time on stderr: on a terminal, when the work lasts longer than a
+/// second.
+class ProgressBar {
+ public:
+  /// `unit` and `total`: what is counted, e.g. "Msamples", 16.8; an empty unit shows the share alone.
+  ProgressBar(const Common& common, std::string label, double total = 0, std::string unit = {});
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+  void show(double share);
+
+ private:
+  std::string label_, unit_;
+  double total_;
+  bool active_, shown_ = false;
+  std::chrono::steady_clock::time_point start_, last_;
+};
+
+/// Options of verbs that evaluate the surface.
+struct SurfaceOptions {
+  double error = 0;
+  int smoothness = 0;
+  std::string blend = "priority", engine = "cpu";
+  bool strict = false;
+  void add_to(CLI::App& verb);
+  BlendOptions blend_options() const;
+};
+
+/// The region options of a query: --extent and --polygon.
+struct RegionOptions {
+  std::vector<double> extent;
+  std::string polygon;
+  void add_to(CLI::App& verb, bool with_polygon);
+  Region region() const;  ///< throws Error where they are no region
+};
+
+void print(const Json& document);
+/// A warning or a note on stderr, not with --quiet.
+void note(const Common& common, const std::string& text);
+double seconds_since(std::chrono::steady_clock::time_point start);
+Json to_json(const Extent& e);
+/// Counts of an extraction by level and by grid name.
+Json by_level(const Extraction& x);
+Json by_grid(const Database& db, const Extraction& x);
+
+}  // namespace patchwork::cli

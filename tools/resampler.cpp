@@ -1,0 +1,83 @@
+#include "tools/resampler.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "db/error.h"
+#include "tools/cli.h"
+
+namespace patchwork::cli {
+
+Raster Raster::covering(const Extent& e, double step) {
+  if (!(step > 0) || !std::isfinite(step)) throw Error("step", "it must be a number of metres above 0");
+  // A sliver of a pixel that rounding leaves makes no column of its own.
+  const auto count = [&](double length) { return std::max(1.0, std::ceil(length / step - 1e-6)); };
+  const double w = count(e.xmax - e.xmin), h = count(e.ymax - e.ymin);
+  if (w > 2e9 || h > 2e9)
+    throw Error("step", "the raster would be too large", "ask for a larger step or a smaller extent");
+  return {e.xmin, e.ymax, step, int(w), int(h)};
+}
+
+RasterFrame Raster::frame(int factor) const {
+  const double s = step * factor;
+  return {xmin + 0.5 * s, s, 0, ymax - 0.5 * s, 0, -s};
+}
+
+double finest_step(const Database& db, const Extent& extent) {
+  double finest = INFINITY;
+  for (const Grid& g : db.grids())
+    if (g.info.frame.bounds(g.info.shape.footprint()).meets(extent))
+      finest = std::min({finest, g.info.frame.step_i(), g.info.frame.step_j()});
+  if (!std::isfinite(finest))
+    throw Error(db.path(), "no grid meets the extent", "see its extent with: patchwork info");
+  return finest;
+}
+
+Resampler::Resampler(const Blend& blend, const Raster& raster, std::vector<std::string> bands)
+    : blend_(blend), raster_(raster), bands_(std::move(bands)) {}
+
+void Resampler::rows(int factor, int row, int rows, std::span<float* const> bands) {
+  const auto start = std::chrono::steady_clock::now();
+  const int width = (raster_.width + factor - 1) / factor;
+  const std::size_t n = size_t(width) * size_t(rows);
+  BlendOutput out;
+  for (const std::string& b : bands_) {
+    if (b == "height") height_.resize(n), out.height = height_;
+    if (b == "bound") bound_.resize(n), out.bound = bound_;
+    if (b == "source") source_.resize(n), out.source = source_;
+  }
+  const BlendCounts c = blend_.at_pixels(raster_.frame(factor), width, row, rows, out);
+  for (std::size_t b = 0; b < bands_.size(); ++b)
+    tbb::parallel_for(0, rows, [&](int r) {
+      const std::size_t from = size_t(r) * size_t(width), to = from + size_t(width);
+      float* f = bands[b];
+      if (bands_[b] == "height")
+        std::copy(height_.begin() + long(from), height_.begin() + long(to), f + from);
+      if (bands_[b] == "source")
+        std::copy(source_.begin() + long(from), source_.begin() + long(to), f + from);
+      // A bound is rounded up, or it would not be one.
+      if (bands_[b] == "bound")
+        for (std::size_t k = from; k < to; ++k) {
+          const float e = float(bound_[k]);
+          f[k] = double(e) < bound_[k] ? std::nextafterf(e, INFINITY) : e;
+        }
+    });
+  if (factor == 1) {
+    tally_.full.points += c.points, tally_.full.contributions += c.contributions;
+    tally_.full.most = std::max(tally_.full.most, c.most);
+    tally_.full.bound_max = std::max(tally_.full.bound_max, c.bound_max);
+  }
+  tally_.blend_seconds += seconds_since(start);
+}
+
+double prefetch(const Database& db, std::span<const PatchId> patches, std::size_t memory) {
+  const auto start = std::chrono::steady_clock::now();
+  if (patches.size() * sizeof(PatchSurface) > memory / 8) return 0;
+  tbb::parallel_for(size_t(0), patches.size(), [&](std::size_t k) { db.surface(patches[k]); });
+  return seconds_since(start);
+}
+
+}  // namespace patchwork::cli

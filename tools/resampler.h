@@ -1,0 +1,53 @@
+// A raster of the surface: where its pixels lie, and its rows at any overview factor.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "blend/blend.h"
+#include "query/extract.h"
+
+namespace patchwork::cli {
+
+/// A north-up raster over an extent of the domain.
+struct Raster {
+  double xmin = 0, ymax = 0, step = 1;  ///< metres; outer corner of the first pixel
+  int width = 0, height = 0;
+
+  /// The pixels of `step` that cover `extent`. Throws Error: a step that is not above 0, more than 2^31
+  /// pixels a side.
+  static Raster covering(const Extent& extent, double step);
+  /// Pixel centres, each pixel standing for factor x factor of this raster's.
+  RasterFrame frame(int factor = 1) const;
+};
+
+/// The finest step of the grids that meet an extent, metres: what `--step` is where it is not given.
+double finest_step(const Database& db, const Extent& extent);
+
+struct ResampleTally {
+  BlendCounts full;          ///< of the full resolution
+  double blend_seconds = 0;  ///< overviews included
+};
+
+/// Fills rows of the bands named (height, bound, source) as float32, NaN (source: 0) where there is no data.
+class Resampler {
+ public:
+  Resampler(const Blend& blend, const Raster& raster, std::vector<std::string> bands);
+  void rows(int factor, int row, int rows, std::span<float* const> bands);
+  const ResampleTally& tally() const { return tally_; }
+
+ private:
+  const Blend& blend_;
+  Raster raster_;
+  std::vector<std::string> bands_;
+  ResampleTally tally_;
+  std::vector<double> height_, bound_;
+  std::vector<std::int32_t> source_;
+};
+
+/// Reads all patches of an extraction into the cache, in parallel, if they fit. Returns seconds.
+double prefetch(const Database& db, std::span<const PatchId> patches, std::size_t memory);
+
+}  // namespace patchwork::cli

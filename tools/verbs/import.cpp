@@ -1,0 +1,165 @@
+// patchwork import: grids into a database, each in one transaction.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "db/error.h"
+#include "tools/cli.h"
+#include "tools/compare.h"
+
+namespace patchwork::cli {
+
+namespace {
+
+struct Options {
+  std::string database, name, crs;
+  std::vector<std::string> files;
+  RasterOptions raster;
+  bool join = false, dry_run = false;
+};
+
+// A database that this run made is taken away again if nothing came into it.
+class NewFileGuard {
+ public:
+  explicit NewFileGuard(std::string path)
+      : path_(std::move(path)), is_new_(!std::filesystem::exists(path_)) {}
+  ~NewFileGuard() {
+    if (!is_new_ || kept_) return;
+    std::error_code ignored;
+    for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(path_ + suffix, ignored);
+  }
+  void keep() { kept_ = true; }
+  bool is_new() const { return is_new_; }
+
+ private:
+  std::string path_;
+  bool is_new_, kept_ = false;
+};
+
+RasterSource open_source(const Options& o, const std::vector<std::string>& files, const std::string& crs) {
+  return files.size() > 1 ? RasterSource::open_joined(files, o.raster, crs)
+                          : RasterSource::open(files.front(), o.raster, crs);
+}
+
+Json json_of(const ImportReport& r, const std::vector<std::string>& warnings,
+             const std::optional<Comparison>& compared) {
+  Json g{{"name", r.name},
+         {"accuracy", r.accuracy},
+         {"patches", r.patches},
+         {"seconds", r.seconds.total},
+         {"warnings", warnings},
+         {"dormant", r.dormant},
+         {"hidden", r.hidden},
+         {"lowered", r.lowered},
+         {"quantisation", r.quantisation},
+         {"extent", to_json(r.extent)}};
+  g["stages"] = {{"read", r.seconds.scan},
+                 {"errors", r.seconds.errors},
+                 {"encode", r.seconds.encode},
+                 {"invariant", r.seconds.invariant},
+                 {"store", r.seconds.store}};
+  if (!r.duplicate_of.empty()) g["duplicate_of"] = r.duplicate_of;
+  if (compared)
+    g["against_database"] = {{"offset", compared->offset},
+                             {"tilt_x", compared->tilt_x},
+                             {"tilt_y", compared->tilt_y},
+                             {"spread", compared->spread},
+                             {"points", compared->points}};
+  return g;
+}
+
+std::string text_of(const ImportReport& r, bool dry_run, const std::optional<Comparison>& compared) {
+  if (!r.duplicate_of.empty())
+    return fmt::format("{}: the same grid is there as {} already; nothing to do", r.name, r.duplicate_of);
+  std::string text = fmt::format(
+      "{}: {} {} patches ({} redundant), {} of other grids hidden, {} shortened; accuracy {:g} m; {:.2f} s",
+      r.name, dry_run ? "would add" : "added", r.patches, r.dormant, r.hidden, r.lowered, r.accuracy,
+      r.seconds.total);
+  text += fmt::format("\n  where: {:.10g} {:.10g} {:.10g} {:.10g}", r.extent.xmin, r.extent.ymin,
+                      r.extent.xmax, r.extent.ymax);
+  if (compared)
+    text += fmt::format(
+        "\n  against what is there: offset {:+.2f} m, tilt {:+.3f} m/km in x and {:+.3f} m/km in y, spread "
+        "{:.2f} m ({} points)",
+        compared->offset, 1000 * compared->tilt_x, 1000 * compared->tilt_y, compared->spread,
+        compared->points);
+  return text;
+}
+
+class ImportRun {
+ public:
+  ImportRun(const Options& options, const Common& common)
+      : o_(options), common_(common), guard_(options.database) {}
+
+  void run() {
+    if (!o_.name.empty() && o_.files.size() > 1 && !o_.join)
+      throw CLI::ValidationError("--name", "it can name one grid only; give one file or --join");
+    std::vector<std::vector<std::string>> sets;
+    if (o_.join)
+      sets.push_back(o_.files);
+    else
+      for (const std::string& f : o_.files) sets.push_back({f});
+    Json grids = Json::array();
+    try {
+      for (const auto& files : sets) grids.push_back(one(files));
+    } catch (...) {
+      if (common_.json && !grids.empty()) print({{"grids", grids}});
+      throw;
+    }
+    if (common_.json) print({{"grids", grids}});
+  }
+
+ private:
+  Json one(const std::vector<std::string>& files) {
+    std::optional<Database> db;
+    if (!guard_.is_new() || opened_) db = Database::open_or_create(o_.database, "", common_.memory);
+    if (db && !o_.crs.empty() && db->crs() != o_.crs && !same_crs(db->crs(), o_.crs))
+      throw Error(o_.database, "its CRS is not " + o_.crs, "leave --crs out, or make another database");
+    const RasterSource source = open_source(o_, files, db && !db->grids().empty() ? db->crs() : o_.crs);
+    for (const std::string& w : source.warnings()) note(common_, files.front() + ": " + w);
+    if (!db) db = Database::open_or_create(o_.database, source.crs(), common_.memory);
+    opened_ = true;
+    std::optional<Comparison> compared;
+    if (o_.dry_run) compared = compare(*db, source);
+    const std::string name = o_.name.empty() ? std::filesystem::path(files.front()).stem().string() : o_.name;
+    const double megasamples = double(source.width()) * source.height() / 1e6;
+    ProgressBar bar(common_, "import " + name, megasamples, "Msamples");
+    const ImportReport report = db->import(source, {.name = name,
+                                                    .memory = common_.memory,
+                                                    .dry_run = o_.dry_run,
+                                                    .progress = [&](double share) { bar.show(share); }});
+    if (!o_.dry_run) guard_.keep();
+    if (!common_.json && !common_.quiet) fmt::print("{}\n", text_of(report, o_.dry_run, compared));
+    return json_of(report, source.warnings(), compared);
+  }
+
+  const Options& o_;
+  const Common& common_;
+  NewFileGuard guard_;
+  bool opened_ = false;
+};
+
+}  // namespace
+
+void add_import(CLI::App& app, Common& common) {
+  auto o = std::make_shared<Options>();
+  CLI::App* v = verb(app, common, "import", "add height grids to a database");
+  v->add_option("DB", o->database, "the database; made if it is not there")->required();
+  v->add_option("FILE", o->files, "height grids in any format that GDAL reads")->required();
+  v->add_option("--accuracy", o->raster.accuracy, "largest error of the grid's surface, metres");
+  v->add_option("--name", o->name, "of the grid; else the file's name without its ending");
+  v->add_option("--crs", o->crs, "CRS of a new database, e.g. EPSG:32610; projected, in metres");
+  v->add_option("--band", o->raster.band, "band that holds the heights, from 1");
+  v->add_option("--nodata", o->raster.nodata, "a further value that means no data (may be repeated)")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  v->add_option("--unit", o->raster.unit, "unit of the heights")
+      ->check(CLI::IsMember({"m", "ft", "us-ft", "cm"}));
+  v->add_option("--vertical-offset", o->raster.vertical_offset, "metres added to every height");
+  v->add_flag("--join", o->join, "the files are tiles of one grid");
+  v->add_flag("--dry-run", o->dry_run, "say what would change, and keep nothing");
+  v->add_flag("--json", common.json, "one JSON document on stdout");
+  v->callback([o, &common] { ImportRun(*o, common).run(); });
+}
+
+}  // namespace patchwork::cli

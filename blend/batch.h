@@ -1,6 +1,8 @@
 // A batch of neighbouring points on its way through the patches that may reach it (used by blend.cpp).
 #pragma once
 
+#include <array>
+#include <memory>
 #include <vector>
 
 #include "blend/blend.h"
@@ -14,47 +16,79 @@ struct Blend::Placed {
   double x0, y0, ua, ub, va, vb, first_i, first_j;
   LatticeRect kernel, domain;  // window coordinates
   LatticeRect samples;         // where the outer samples lie; beyond them the bound grows by `rim`
-  double rim;                  // metres
-  double error;                // metres, for the blend's smoothness
-  double volume;  // 1 / (half sides of the domain in metres): makes Wendland weights of unit volume
+  LatticeRect ramp;  // the domain, but not beyond the samples: there the patch speaks if nothing else does
+  double rim;        // metres
+  double error;      // metres, for the blend's smoothness
+  double volume;     // 1 / (half sides of the domain in metres): makes Wendland weights of unit volume
   double quantum, base, origin;  // height = quantum (origin + code) + base
   std::int32_t source;           // 1 + place of the grid
   bool ragged;                   // has cells without data
   Extent bounds;
 
   LatticeRect window_bounds(const Point corners[4]) const;
+  // No point of the kernel lies beyond the outer samples, whatever the rounding.
+  bool kernel_is_sampled() const {
+    return kernel.i0 > samples.i0 && kernel.j0 > samples.j0 && kernel.i1 < samples.i1 &&
+           kernel.j1 < samples.j1;
+  }
 };
 
-/// Scratch and accumulators of one batch; reused by a thread.
+/// Scratch and accumulators of one batch; reused by a thread for one list of patches.
 class Batch {
  public:
   static constexpr int kPoints = 1024;
+  Batch();
 
-  /// Where the points of the batch go; at most kPoints.
+  /// Where the points of the batch lie; at most kPoints. Overwritten by compose().
   std::vector<double> x, y;
 
   /// Composes `candidates` (places in `placed`, in order of priority) at the points.
   /// `inside`: with priority, the first candidate's kernel is known to contain all points, and it has no
-  /// holes.
+  /// holes. `named`: source and patch are wanted too.
   void compose(const Database& db, const std::vector<Blend::Placed>& placed,
-               const std::vector<std::uint32_t>& candidates, bool inside, const BlendOptions& options);
+               const std::vector<std::uint32_t>& candidates, bool inside, bool named,
+               const BlendOptions& options);
 
   std::vector<double> height, bound;
   std::vector<std::int32_t> source, patch;
   BlendCounts counts;
 
  private:
-  void reset(std::size_t n);
-  bool select(const Blend::Placed& p, const BlendOptions& options);
-  void fade_at_holes(const PatchSurface::Holes& holes, int smoothness);
-  void read(const Blend::Placed& p, const PatchSurface& s, int smoothness);
-  void add(const Blend::Placed& p, std::uint32_t place, const PatchSurface& s, bool priority);
-  void finish(const BlendOptions& options);
+  // Points that the current patch reaches, in window coordinates.
+  struct Reached {
+    std::vector<double> u, v, weight, value;
+    std::vector<std::uint32_t> at;  // which points these are
+    std::size_t n = 0;
+  };
 
-  std::vector<double> u_, v_, weight_, value_;          // of the points that the current patch reaches
-  std::vector<std::uint32_t> at_;                       // which points these are
-  std::vector<double> rest_, sum_, low_, high_, most_;  // of all points
-  std::vector<std::uint32_t> reads_;
+  const PatchSurface& surface(const Database& db, const Blend::Placed& p, std::uint32_t place);
+  void compose_inside(const Blend::Placed& p, std::uint32_t place, const PatchSurface& s, int smoothness);
+  void weigh(const Blend::Placed& p, const BlendOptions& options);
+  void split();
+  void take_all();
+  void drop_settled();
+  void fade_at_holes(const PatchSurface::Holes& holes, int smoothness);
+  void read(const Blend::Placed& p, const PatchSurface& s, int smoothness, Reached& reached);
+  void settle(const Blend::Placed& p, std::uint32_t place);
+  void add(const Blend::Placed& p, std::uint32_t place, const PatchSurface& s, bool priority);
+  void start();
+  void finish();
+  void withhold(double error);
+  void forget(std::size_t k);
+
+  bool named_ = false;
+  std::size_t left_ = 0;  // points that are not settled: x, y and left_at_ [0, left_)
+  std::vector<std::uint32_t> left_at_;
+  Reached whole_, part_;  // the patch alone decides; the patch is one of several
+  std::vector<double> rest_, sum_, low_, high_, worst_,
+      most_;                                    // of all points; but for rest_ valid where reads_ > 0
+  std::vector<std::uint32_t> reads_, touched_;  // patches read; points that went through part_
+  std::size_t settled_ = 0, touches_ = 0;
+
+  // The surfaces last used, by place modulo kHeld: the database's cache is shared and locked.
+  static constexpr std::size_t kHeld = 64;
+  std::array<std::shared_ptr<const PatchSurface>, kHeld> held_;
+  std::array<std::uint32_t, kHeld> held_place_{};
 };
 
 }  // namespace patchwork

@@ -25,6 +25,15 @@ LatticeRect to_window(const LatticeRect& r, const Blend::Placed& p, double scale
           r.j1 * scale - p.first_j};
 }
 
+// Ramps end at the outer samples, so that the larger bound of what is extrapolated beyond them does not mix
+// into the heights of other patches. A kernel that reaches them itself (2 samples) leaves no room for that.
+LatticeRect ramp_of(const LatticeRect& kernel, const LatticeRect& domain, const LatticeRect& samples) {
+  return {kernel.i0 > samples.i0 ? std::max(domain.i0, samples.i0) : domain.i0,
+          kernel.j0 > samples.j0 ? std::max(domain.j0, samples.j0) : domain.j0,
+          kernel.i1 < samples.i1 ? std::min(domain.i1, samples.i1) : domain.i1,
+          kernel.j1 < samples.j1 ? std::min(domain.j1, samples.j1) : domain.j1};
+}
+
 Blend::Placed place(const Database& db, PatchId id, int smoothness) {
   const Grid& g = db.grid(id.grid());
   const Frame& f = g.info.frame;
@@ -40,6 +49,7 @@ Blend::Placed place(const Database& db, PatchId id, int smoothness) {
   p.kernel = to_window(shape.kernel(id.level(), id.bx(), id.by()), p, scale);
   p.domain = to_window(domain, p, scale);
   p.samples = to_window({0, 0, shape.width() - 1.0, shape.height() - 1.0}, p, scale);
+  p.ramp = ramp_of(p.kernel, p.domain, p.samples);
   p.ragged = g.at(id.level(), id.bx(), id.by()).ragged();
   p.rim = g.info.rim_error;
   p.error = g.at(id.level(), id.bx(), id.by()).error[size_t(smoothness)];
@@ -105,17 +115,18 @@ struct Run {
     for (const Worker& w : workers) all.add(w.tally.counts);
     return all.counts;
   }
-  template <class Index>  // index(k): where the batch's k-th point goes
-  void compose(Batch& batch, const Candidates& candidates, bool inside, Tally& tally, Index index) const {
-    batch.compose(db, placed, candidates, inside, options);
-    tally.add(batch.counts);
-    for (std::size_t k = 0; k < batch.x.size(); ++k) {
-      const std::size_t to = index(k);
-      if (!out.height.empty()) out.height[to] = batch.height[k];
-      if (!out.bound.empty()) out.bound[to] = batch.bound[k];
-      if (!out.source.empty()) out.source[to] = batch.source[k];
-      if (!out.patch.empty()) out.patch[to] = batch.patch[k];
-    }
+  void compose(Worker& w, const Candidates& candidates, bool inside) const {
+    const bool named = !out.source.empty() || !out.patch.empty();
+    w.batch.compose(db, placed, candidates, inside, named, options);
+    w.tally.add(w.batch.counts);
+  }
+  // Points [k, k + n) of the batch go to the places from `to` on.
+  void put(const Batch& batch, std::size_t k, std::size_t n, std::size_t to) const {
+    const auto copy = [&](const auto& from, const auto& into) {
+      if (!into.empty()) std::copy_n(from.data() + k, n, into.data() + to);
+    };
+    copy(batch.height, out.height), copy(batch.height, out.height32), copy(batch.bound, out.bound);
+    copy(batch.source, out.source), copy(batch.patch, out.patch);
   }
 };
 
@@ -139,7 +150,8 @@ class PointRun : public Run {
       Batch& batch = w.batch;
       batch.x.resize(points.size()), batch.y.resize(points.size());
       for (std::size_t k = 0; k < points.size(); ++k) batch.x[k] = x_[points[k]], batch.y[k] = y_[points[k]];
-      compose(batch, candidates, inside, w.tally, [&](std::size_t k) { return points[k]; });
+      compose(w, candidates, inside);
+      for (std::size_t k = 0; k < points.size(); ++k) put(batch, k, 1, points[k]);
       return;
     }
     const auto& along = e.xmax - e.xmin > e.ymax - e.ymin ? x_ : y_;
@@ -192,17 +204,17 @@ class PixelRun : public Run {
   void evaluate(int c0, int r0, int c1, int r1, const Candidates& candidates, bool inside) {
     Worker& w = workers.local();
     Batch& batch = w.batch;
-    const int n = (c1 - c0) * (r1 - r0), across = c1 - c0;
-    batch.x.resize(size_t(n)), batch.y.resize(size_t(n));
-    for (int r = r0, k = 0; r < r1; ++r)
-      for (int c = c0; c < c1; ++c, ++k) {
+    const std::size_t across = size_t(c1 - c0), n = across * size_t(r1 - r0);
+    batch.x.resize(n), batch.y.resize(n);
+    double *x = batch.x.data(), *y = batch.y.data();
+    for (int r = r0; r < r1; ++r)
+      for (int c = c0; c < c1; ++c) {
         const Point p = at(c, r);
-        batch.x[size_t(k)] = p.x, batch.y[size_t(k)] = p.y;
+        *x++ = p.x, *y++ = p.y;
       }
-    compose(batch, candidates, inside, w.tally, [&](std::size_t k) {
-      const int r = r0 + int(k) / across, c = c0 + int(k) % across;
-      return size_t(r - row_) * size_t(width_) + size_t(c);
-    });
+    compose(w, candidates, inside);
+    for (int r = r0; r < r1; ++r)
+      put(batch, size_t(r - r0) * across, across, size_t(r - row_) * size_t(width_) + size_t(c0));
   }
   const RasterFrame& raster_;
   int width_, row_;
@@ -238,6 +250,7 @@ BlendCounts Blend::at_points(std::span<const double> x, std::span<const double> 
     if (!out.bound.empty()) out.bound[*k] = NAN;
     if (!out.source.empty()) out.source[*k] = 0;
     if (!out.patch.empty()) out.patch[*k] = -1;
+    if (!out.height32.empty()) out.height32[*k] = NAN;
   }
   if (finite != points.begin()) run.halve({points.begin(), finite}, all_of(*placed_));
   return run.counts();

@@ -31,6 +31,7 @@ struct BlendOutput {
       source;  ///< 1 + place in Database::grids(); negative where only a filled cell replies; 0 none
   std::span<std::int32_t>
       patch;  ///< place in the blend's patches of the one with the largest weight; -1 none
+  std::span<float> height32 = {};  ///< the height rounded to float32, for rasters that hold no more
 };
 
 /// How many patches were read.

@@ -10,23 +10,27 @@ namespace {
 
 constexpr int kSide = PatchSurface::kSide;
 
-// The cell that holds a window coordinate: the domain spans [1, 33], its far end belongs to the last cell.
+// The cell that holds a window coordinate; the far end of the window belongs to its last cell.
 inline int cell_of(double u) {
   const int c = int(u);
   return c < 1 ? 1 : c > kSide - 3 ? kSide - 3 : c;
 }
 
+// Where one ramp is below 1 the opposite one is not, rounding included: one division an axis gives the
+// smaller of the two (or something above 1, as it does).
 template <int k>
-[[gnu::always_inline]] inline void ramps(const LatticeRect& kernel, const LatticeRect& domain,
-                                         const double* u, const double* v, int n, double* __restrict weight) {
+[[gnu::always_inline]] inline void ramps(const LatticeRect& kernel, const LatticeRect& ramp,
+                                         const LatticeRect& domain, const double* u, const double* v, int n,
+                                         double* __restrict weight) {
+  const double low_i = kernel.i0 - ramp.i0, high_i = ramp.i1 - kernel.i1;
+  const double low_j = kernel.j0 - ramp.j0, high_j = ramp.j1 - kernel.j1;
   for (int p = 0; p < n; ++p) {
-    const double a = (u[p] - domain.i0) / (kernel.i0 - domain.i0),
-                 b = (domain.i1 - u[p]) / (domain.i1 - kernel.i1);
-    const double c = (v[p] - domain.j0) / (kernel.j0 - domain.j0),
-                 d = (domain.j1 - v[p]) / (domain.j1 - kernel.j1);
-    const double s = a < b ? a : b, t = c < d ? c : d;
+    const bool below_i = u[p] < kernel.i0, below_j = v[p] < kernel.j0;
+    const double s = (below_i ? u[p] - ramp.i0 : ramp.i1 - u[p]) / (below_i ? low_i : high_i);
+    const double t = (below_j ? v[p] - ramp.j0 : ramp.j1 - v[p]) / (below_j ? low_j : high_j);
     const double w = smoothstep<k>(s) * smoothstep<k>(t);
-    weight[p] = s < 0 || t < 0 ? -1.0 : w;
+    const bool outside = u[p] < domain.i0 || u[p] > domain.i1 || v[p] < domain.j0 || v[p] > domain.j1;
+    weight[p] = outside ? -1.0 : w;
   }
 }
 
@@ -69,17 +73,20 @@ template <int k>
   }
 }
 
-PATCHWORK_VECTORIZED void ramps0(const LatticeRect& kernel, const LatticeRect& domain, const double* u,
-                                 const double* v, int n, double* weight) {
-  ramps<0>(kernel, domain, u, v, n, weight);
+PATCHWORK_VECTORIZED void ramps0(const LatticeRect& kernel, const LatticeRect& ramp,
+                                 const LatticeRect& domain, const double* u, const double* v, int n,
+                                 double* weight) {
+  ramps<0>(kernel, ramp, domain, u, v, n, weight);
 }
-PATCHWORK_VECTORIZED void ramps1(const LatticeRect& kernel, const LatticeRect& domain, const double* u,
-                                 const double* v, int n, double* weight) {
-  ramps<1>(kernel, domain, u, v, n, weight);
+PATCHWORK_VECTORIZED void ramps1(const LatticeRect& kernel, const LatticeRect& ramp,
+                                 const LatticeRect& domain, const double* u, const double* v, int n,
+                                 double* weight) {
+  ramps<1>(kernel, ramp, domain, u, v, n, weight);
 }
-PATCHWORK_VECTORIZED void ramps2(const LatticeRect& kernel, const LatticeRect& domain, const double* u,
-                                 const double* v, int n, double* weight) {
-  ramps<2>(kernel, domain, u, v, n, weight);
+PATCHWORK_VECTORIZED void ramps2(const LatticeRect& kernel, const LatticeRect& ramp,
+                                 const LatticeRect& domain, const double* u, const double* v, int n,
+                                 double* weight) {
+  ramps<2>(kernel, ramp, domain, u, v, n, weight);
 }
 PATCHWORK_VECTORIZED void smooth0(const float* codes, const double* u, const double* v, int n,
                                   double* value) {
@@ -105,10 +112,10 @@ PATCHWORK_VECTORIZED void to_window(const WindowMap& m, const double* x, const d
   }
 }
 
-void ramp_weights(int smoothness, const LatticeRect& kernel, const LatticeRect& domain, const double* u,
-                  const double* v, int n, double* weight) {
+void ramp_weights(int smoothness, const LatticeRect& kernel, const LatticeRect& ramp,
+                  const LatticeRect& domain, const double* u, const double* v, int n, double* weight) {
   constexpr decltype(&ramps0) by_smoothness[] = {ramps0, ramps1, ramps2};
-  by_smoothness[smoothness](kernel, domain, u, v, n, weight);
+  by_smoothness[smoothness](kernel, ramp, domain, u, v, n, weight);
 }
 
 PATCHWORK_VECTORIZED void wendland_weights(int smoothness, const LatticeRect& domain, const double* u,

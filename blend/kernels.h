@@ -14,10 +14,11 @@ struct WindowMap {
 /// Window coordinates of n points.
 void to_window(const WindowMap& m, const double* x, const double* y, int n, double* u, double* v);
 
-/// Weight of a rectangle at window coordinates: ramps from 0 at the rim of `domain` to 1 on `kernel`
+/// Weight of a rectangle at window coordinates: ramps from 0 at the rim of `ramp` to 1 on `kernel`
 /// (priority), or Wendland's function of the distance from the domain's centre; -1 outside the closed domain.
-void ramp_weights(int smoothness, const LatticeRect& kernel, const LatticeRect& domain, const double* u,
-                  const double* v, int n, double* weight);
+/// REQUIRES: kernel inside ramp (no shared edge), ramp inside domain.
+void ramp_weights(int smoothness, const LatticeRect& kernel, const LatticeRect& ramp,
+                  const LatticeRect& domain, const double* u, const double* v, int n, double* weight);
 void wendland_weights(int smoothness, const LatticeRect& domain, const double* u, const double* v, int n,
                       double* weight);
 

@@ -89,7 +89,7 @@ LodBox lod_box(const Grid& grid, std::size_t index) {
   const GridShape::Block b = grid.info.shape.block(index);
   const Extent e = grid.info.frame.bounds(grid.info.shape.domain(b.level, b.bx, b.by));
   const PatchRecord& p = grid.patches[index];
-  return {e.xmin, e.ymin, e.xmax, e.ymax, p.best() ? 0.f : round_down(p.bottom()), round_up(p.top)};
+  return {e.xmin, e.ymin, e.xmax, e.ymax, p.best() ? 0.f : round_down(p.bottom), round_up(p.top)};
 }
 
 Database::Impl::Impl(Store opened, std::size_t memory)
@@ -157,7 +157,8 @@ Database Database::open_or_create(const std::string& path, const std::string& cr
   Database db(std::make_unique<Impl>(Store::open(path, Store::Mode::create), memory));
   Store& store = db.impl_->store;
   store.begin_write();
-  if (!store.fact("crs")) store.set_fact("crs", crs);
+  const std::string known = store.fact("crs").value_or("");
+  if (known.empty() && !crs.empty() && store.grids().empty()) store.set_fact("crs", crs);
   store.commit();
   db.impl_->load();
   return db;
@@ -220,7 +221,7 @@ std::shared_ptr<const PatchSurface> Database::surface(PatchId id) const {
     s->domain = g.info.shape.domain(level, id.bx(), id.by());
     Window window(*impl_, g.info, level);
     window.fill(*s, first_i, first_j);
-    if (patch(id).ragged()) s->holes = make_holes(window, id.bx(), id.by());
+    if (patch(id).ragged()) s->holes = make_holes(window, level, id.bx(), id.by());
     return s;
   });
 }

@@ -21,10 +21,10 @@ namespace patchwork {
 inline constexpr std::size_t kDefaultMemory = std::size_t{1} << 30;
 
 struct ImportOptions {
-  std::string name;                     ///< of the grid; unique in the database
+  std::string name = {};                ///< of the grid; unique in the database
   std::size_t memory = kDefaultMemory;  ///< bytes
   bool dry_run = false;                 ///< all of it, then nothing is kept
-  Progress progress;                    ///< share done; may be empty
+  Progress progress = {};               ///< share done; may be empty
 };
 
 struct ImportReport {

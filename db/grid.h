@@ -1,7 +1,6 @@
 // What a database knows of one grid and of each of its patches, heights apart.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -37,21 +36,24 @@ struct GridInfo {
 /// A patch without its heights. Errors in metres, eps and q included.
 struct PatchRecord {
   enum Flag : std::uint64_t { kExists = 1, kBest = 2, kRagged = 4 };
-  std::array<double, 3> error{};  ///< of smoothness k = 0, 1, 2
+  std::array<double, 3> error{};  ///< of smoothness k = 0, 1, 2: the bound where this patch speaks
+  /// The largest of `error`, one index for every k; at level 0 that of k = 0. A smooth surface through the
+  /// samples departs from the bilinear one by as much as the data are rough, and if that counted a rough
+  /// survey would rank behind the blurred one that it is meant to replace.
+  double bottom = 0;
   double top = std::numeric_limits<double>::infinity();
   std::uint64_t flags = 0;
 
-  double bottom() const { return std::max({error[0], error[1], error[2]}); }
   bool exists() const { return flags & kExists; }
   /// Best available somewhere: its box reaches down to error 0.
   bool best() const { return flags & kBest; }
   /// Some cell of its domain holds no data.
   bool ragged() const { return flags & kRagged; }
   /// Redundant: kept, but in no cut.
-  bool dormant() const { return top <= bottom(); }
+  bool dormant() const { return top <= bottom; }
   bool operator==(const PatchRecord&) const = default;
 };
-static_assert(sizeof(PatchRecord) == 40);
+static_assert(sizeof(PatchRecord) == 48);
 
 /// What a ragged patch offers other grids as cover: at most eight disjoint rectangles of its block's cells.
 struct Offer {

@@ -32,8 +32,12 @@ LatticeRect GridShape::kernel(int level, int bx, int by) const {
 LatticeRect GridShape::domain(int level, int bx, int by) const {
   const double side = std::ldexp(kKernelCells, level), rim = std::ldexp(kExtensionCells, level);
   const LatticeRect f = footprint();
-  return {std::max(f.i0, bx * side - rim), std::max(f.j0, by * side - rim),
-          std::min(f.i1, (bx + 1) * side + rim), std::min(f.j1, (by + 1) * side + rim)};
+  // Behind the last block lies at most a feather, which no other patch would answer.
+  const auto end = [&](int b, int blocks, double last) {
+    return b + 1 == blocks ? last : std::min(last, (b + 1) * side + rim);
+  };
+  return {std::max(f.i0, bx * side - rim), std::max(f.j0, by * side - rim), end(bx, blocks_i(level), f.i1),
+          end(by, blocks_j(level), f.j1)};
 }
 
 GridShape::Block GridShape::block(std::size_t index) const {

@@ -11,7 +11,11 @@ namespace patchwork {
 
 inline constexpr int kKernelCells = 28;    ///< K: cells of a block, at its own level
 inline constexpr int kExtensionCells = 2;  ///< m: cells by which the domain outgrows the block
-inline constexpr int kFeatherCells = 2;    ///< level-0 cells over which a grid fades at its border
+/// Level-0 cells over which a grid fades at the border of its data. Two cells leave a step where
+/// surveys disagree: at the edge of a 3 arc second grid on a 30 arc second one the mean step was 1.9 times
+/// its neighbourhood's, with eight 1.1 times.
+inline constexpr int kFeatherCells = 8;
+inline constexpr int kHoleFeatherCells = 2;              ///< the same towards holes inside
 inline constexpr int kChunkVertices = 4 * kKernelCells;  ///< side of a stored payload chunk, vertices
 
 /// Pure arithmetic on width, height and registration (design: model, section 2). Rectangles are in level-0

@@ -80,7 +80,7 @@ class Importer {
         options_(options),
         source_(source),
         ingest_(source, options.memory, [&](double share) { say(0.2 * share); }),
-        errors_(ingest_.shape()) {
+        errors_(ingest_.shape(), ingest_.masks()) {
     watch_.add_to(report_.seconds.scan);
   }
 
@@ -146,24 +146,23 @@ class Importer {
       if (!band.valid.empty())
         digest_.add(band.valid.data() + size_t(y - l.first()) * size_t(shape().width()),
                     size_t(shape().width()));
-      note_rim(l, y);
+      note_rim(band, y);
     }
   }
 
   // Second differences across the border: what the half cell beyond it may hide.
-  void note_rim(const Lattice& l, int y) {
+  void note_rim(const Ingest::Band& band, int y) {
     const int w = shape().width(), h = shape().height();
     if (!shape().pixel_is_area()) return;
-    const float* v = l.row(y);
-    if (w > 2)
-      rim_i_ = std::max<double>(
-          {rim_i_, std::abs(v[0] - 2 * v[1] + v[2]), std::abs(v[w - 1] - 2 * v[w - 2] + v[w - 3])});
+    const Lattice& l = band.levels[0];
+    const auto bend = [&](int i, int j, int di, int dj) -> double {
+      for (int n = 0; n < 3 && !band.valid.empty(); ++n)
+        if (!band.valid[size_t(j + n * dj - l.first()) * size_t(w) + size_t(i + n * di)]) return 0;
+      return std::abs(l.row(j)[i] - 2 * l.row(j + dj)[i + di] + l.row(j + 2 * dj)[i + 2 * di]);
+    };
+    if (w > 2) rim_i_ = std::max({rim_i_, bend(0, y, 1, 0), bend(w - 1, y, -1, 0)});
     if (h > 2 && (y == 0 || y == h - 1))
-      for (int i = 0; i < w; ++i) {
-        const int inward = y == 0 ? 1 : -1;
-        rim_j_ =
-            std::max<double>(rim_j_, std::abs(v[i] - 2 * l.row(y + inward)[i] + l.row(y + 2 * inward)[i]));
-      }
+      for (int i = 0; i < w; ++i) rim_j_ = std::max(rim_j_, bend(i, y, 0, y == 0 ? 1 : -1));
   }
 
   const Lattice& lattice(const Ingest::Band& band, int level) const {
@@ -179,8 +178,9 @@ class Importer {
     });
   }
 
-  static int chunk_end(const Lattice& l, int y1) {
-    return l.first() + l.count() == l.rows() ? l.rows() : y1 >> l.level();
+  // The margin behind a band may reach the last row; its chunks belong to the band that ends there.
+  int chunk_end(const Lattice& l, int y1) const {
+    return y1 == shape().height() ? l.rows() : y1 >> l.level();
   }
 
   void encode(const Lattice& l, int r0, int r1) {
@@ -242,9 +242,10 @@ class Importer {
       double outline = 0;
       if (!offers.empty()) outline = look_at_holes(b, p, offers[k]), offers[k].index = std::uint32_t(k);
       const std::array<double, 3> delta = errors_.of(b.level, b.bx, b.by);
+      const double floor = source_.accuracy_in(shape().domain(b.level, b.bx, b.by)) + grid_.info.quantisation;
       for (std::size_t i = 0; i < 3; ++i)
-        p.error[i] = std::max(
-            grid_.info.accuracy + grid_.info.quantisation + delta[i] * std::abs(grid_.info.quantum), outline);
+        p.error[i] = std::max(floor + delta[i] * std::abs(grid_.info.quantum), outline);
+      p.bottom = b.level == 0 ? p.error[0] : *std::max_element(p.error.begin(), p.error.end());
     });
     for (const Offer& o : offers)
       if (grid_.patches[o.index].exists() && grid_.patches[o.index].ragged()) grid_.offers.push_back(o);
@@ -254,18 +255,23 @@ class Importer {
   double look_at_holes(const GridShape::Block& b, PatchRecord& p, Offer& offer) const {
     const MaskCells cells(ingest_.masks(), b.level);
     bool answers = false, differ = false;
-    for (int j = -kExtensionCells; j < kKernelCells + kExtensionCells; ++j)
-      for (int i = -kExtensionCells; i < kKernelCells + kExtensionCells; ++i) {
-        const int x = b.bx * kKernelCells + i, y = b.by * kKernelCells + j;
+    const LatticeRect d = shape().domain(b.level, b.bx, b.by);
+    const int step = 1 << b.level, i0 = b.bx * kKernelCells, j0 = b.by * kKernelCells;
+    // The domain's cells; behind a last block they have no other patch to answer for them.
+    const int end_i = int(std::ceil(d.i1 / step)), end_j = int(std::ceil(d.j1 / step));
+    const int own_i = b.bx + 1 == shape().blocks_i(b.level) ? end_i : i0 + kKernelCells;
+    const int own_j = b.by + 1 == shape().blocks_j(b.level) ? end_j : j0 + kKernelCells;
+    for (int y = int(std::floor(d.j0 / step)); y < end_j; ++y)
+      for (int x = int(std::floor(d.i0 / step)); x < end_i; ++x) {
         const std::uint8_t c = cells.cell(x, y);
-        differ |= c == CellMasks::kAnswering;
-        const bool inside = i >= 0 && j >= 0 && i < kKernelCells && j < kKernelCells;
+        differ |= (c & CellMasks::kAnswering) && !(c & CellMasks::kReal);
+        const bool inside = x >= i0 && y >= j0 && x < own_i && y < own_j;
         answers |= inside && (c & CellMasks::kAnswering);
       }
     if (!answers) p.flags = 0;
-    if (!answers || !make_holes(cells, b.bx, b.by)) return 0;
+    if (!answers || !make_holes(cells, b.level, b.bx, b.by)) return 0;
     p.flags |= PatchRecord::kRagged;
-    offer = make_offer(cells, b.bx, b.by);
+    offer = make_offer(cells, b.level, b.bx, b.by);
     return differ ? std::hypot(grid_.info.frame.step_i(), grid_.info.frame.step_j()) * std::ldexp(1, b.level)
                   : 0;
   }

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "db/error.h"
+#include "db/vectorized.h"
 
 namespace patchwork {
 
@@ -18,6 +19,7 @@ constexpr int kScanRows = 256;
 constexpr int kMargin = 24;  // rows around a band: stencils of the streamed levels, and filled holes
 constexpr double kCodeRange = 1 << 23;  // codes stay exact in float32, their differences too
 constexpr int kFillRings = 4;
+constexpr std::size_t kBandSamples = std::size_t{4} << 20;  // of a band whose raw samples are at hand
 
 // The exponent of the lowest bit set in a finite number.
 int lowest_bit(double v) {
@@ -40,35 +42,30 @@ std::vector<int> knots_along(int n, int levels) {
   return {knots.begin(), knots.end()};
 }
 
-}  // namespace
-
-CellMasks CellMasks::from_cells(std::vector<std::uint8_t> cells, const GridShape& shape) {
-  CellMasks masks;
-  for (std::uint8_t& c : cells) c = c ? kReal | kAnswering : 0;
-  masks.levels_.push_back({shape.width() - 1, shape.height() - 1, std::move(cells)});
-  for (int l = 1; l < shape.levels(); ++l) {
-    const int cols = shape.lattice_cols(l) - 1, rows = shape.lattice_rows(l) - 1;
-    Level level{cols, rows, std::vector<std::uint8_t>(size_t(cols) * size_t(rows))};
-    for (int j = 0; j < rows; ++j)
-      for (int i = 0; i < cols; ++i) {
-        std::uint8_t all = kReal, any = 0;
-        for (int y = 2 * j; y < std::min(2 * j + 2, masks.rows(l - 1)); ++y)
-          for (int x = 2 * i; x < std::min(2 * i + 2, masks.cols(l - 1)); ++x)
-            all &= masks.at(l - 1, x, y), any |= masks.at(l - 1, x, y);
-        level.cells[size_t(j) * size_t(cols) + size_t(i)] = std::uint8_t(all | (any & kAnswering));
-      }
-    masks.levels_.push_back(std::move(level));
-  }
-  return masks;
+// code_of() of n samples.
+template <class Raw>
+[[gnu::always_inline]] inline void to_codes(const Raw* raw, std::size_t n, double quantum, double origin,
+                                            float* __restrict codes) {
+  for (std::size_t k = 0; k < n; ++k) codes[k] = float(std::nearbyint(double(raw[k]) / quantum) - origin);
 }
+PATCHWORK_VECTORIZED void codes_of(const float* raw, std::size_t n, double quantum, double origin,
+                                   float* codes) {
+  to_codes(raw, n, quantum, origin, codes);
+}
+PATCHWORK_VECTORIZED void codes_of(const double* raw, std::size_t n, double quantum, double origin,
+                                   float* codes) {
+  to_codes(raw, n, quantum, origin, codes);
+}
+
+}  // namespace
 
 Ingest::Ingest(const RasterSource& source, std::size_t memory, const Progress& progress)
     : source_(source), shape_(source.width(), source.height(), source.pixel_is_area()) {
   const std::size_t samples = size_t(shape_.width()) * size_t(shape_.height());
   const int chunk_rows = kChunkVertices << (kStreamedLevels - 1);
   if (source.float_is_exact() && samples * sizeof(float) <= memory / 4) {
-    kept_.resize(samples);
-    band_rows_ = (shape_.height() + chunk_rows - 1) / chunk_rows * chunk_rows;
+    kept_ = Buffer<float>(samples);
+    band_rows_ = std::max(1, int(kBandSamples / size_t(shape_.width()) / size_t(chunk_rows))) * chunk_rows;
   } else {  // a row of a band costs its code, its raw form, its mask and a third for the levels made of it
     const std::size_t row_bytes = size_t(shape_.width()) * 24;
     band_rows_ =
@@ -280,10 +277,10 @@ Ingest::Band Ingest::read_band(int y0, int y1) const {
   if (!masks_.empty()) band.valid.resize(n);
   const auto take = [&](const auto* raw) {
     tbb::parallel_for(size_t(0), size_t(end - first), [&](std::size_t r) {
-      for (std::size_t k = r * size_t(w); k < (r + 1) * size_t(w); ++k) {
-        codes[k] = float(code_of(raw[k]));
-        if (!band.valid.empty()) band.valid[k] = raw[k] == raw[k];
-      }
+      const std::size_t from = r * size_t(w), to = from + size_t(w);
+      codes_of(raw + from, size_t(w), quantiser_.quantum, double(quantiser_.origin), codes.data() + from);
+      if (band.valid.empty()) return;
+      for (std::size_t k = from; k < to; ++k) band.valid[k] = raw[k] == raw[k];
     });
   };
   if (!kept_.empty()) {

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "db/buffer.h"
+#include "db/cell_masks.h"
 #include "db/grid.h"
 #include "db/lattice.h"
 #include "db/raster.h"
@@ -17,28 +19,6 @@ struct Quantiser {
   double quantum = 1;  ///< raw units per code
   std::int64_t origin = 0;
   double error = 0;  ///< largest distance between a sample and its stored form, raw units
-};
-
-/// Which cells of every level hold data (design: model, section 2, holes). Empty for a grid without holes.
-class CellMasks {
- public:
-  enum Cell : std::uint8_t { kReal = 1, kAnswering = 2 };
-  bool empty() const { return levels_.empty(); }
-  int cols(int level) const { return levels_[size_t(level)].cols; }
-  int rows(int level) const { return levels_[size_t(level)].rows; }
-  std::uint8_t at(int level, int i, int j) const {
-    const Level& l = levels_[size_t(level)];
-    return l.cells[size_t(j) * size_t(l.cols) + size_t(i)];
-  }
-  /// Level-0 cells (1 = valid), (width - 1) x (height - 1), and from them all others.
-  static CellMasks from_cells(std::vector<std::uint8_t> cells, const GridShape& shape);
-
- private:
-  struct Level {
-    int cols, rows;
-    std::vector<std::uint8_t> cells;
-  };
-  std::vector<Level> levels_;
 };
 
 /// Called with the share of the work done, 0 to 1.
@@ -86,7 +66,7 @@ class Ingest {
   const RasterSource& source_;
   GridShape shape_;
   int band_rows_ = 0;
-  std::vector<float> kept_;  // raw samples, where they fit
+  Buffer<float> kept_;  // raw samples, where they fit
   Quantiser quantiser_;
   double low_ = 0, high_ = 0;
   int finest_bit_ = 1 << 20;                          // exponent of the finest bit set in any raw sample

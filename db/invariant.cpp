@@ -73,14 +73,23 @@ class Search {
     return less(s.grid, s.index, g, index, counts_);
   }
 
-  // Greater patches of the subject's own grid are its ancestors, and each covers it whole.
+  // Greater patches of the subject's own grid are its ancestors and, at the border, the only child that is
+  // left of four where it has the same kernel; each covers it whole.
   double top_within_grid(const Subject& s) const {
+    const GridShape& shape = s.grid.info.shape;
     double top = kInfinity;
-    for (int l = s.block.level + 1, bx = s.block.bx, by = s.block.by; l < s.grid.info.shape.levels(); ++l) {
-      bx /= 2, by /= 2;
-      const std::size_t k = s.grid.info.shape.index(l, bx, by);
+    const auto note = [&](std::size_t k) {
       const PatchRecord& p = s.grid.patches[k];
-      if (p.exists() && p.bottom() < top && greater(s.grid, k, s)) top = p.bottom();
+      if (p.exists() && p.bottom < top && greater(s.grid, k, s)) top = p.bottom;
+    };
+    for (int l = s.block.level + 1, bx = s.block.bx, by = s.block.by; l < shape.levels(); ++l) {
+      bx /= 2, by /= 2;
+      note(shape.index(l, bx, by));
+    }
+    for (int l = s.block.level - 1, bx = s.block.bx, by = s.block.by; l >= 0; --l) {
+      bx *= 2, by *= 2;
+      if (area(shape.kernel(l, bx, by)) != area(s.kernel)) break;
+      note(shape.index(l, bx, by));
     }
     return top;
   }
@@ -96,7 +105,7 @@ class Search {
         for (int by = r.j0; by <= r.j1; ++by)
           for (int bx = r.i0; bx <= r.i1; ++bx) {
             const std::size_t k = g.info.shape.index(l, bx, by);
-            if (g.patches[k].exists() && g.patches[k].bottom() < own && greater(g, k, s))
+            if (g.patches[k].exists() && g.patches[k].bottom < own && greater(g, k, s))
               offer(g, k, l, bx, by);
           }
       }
@@ -118,8 +127,7 @@ class Search {
 
   bool better(const Grid& g, std::size_t index, const Subject& s) const {
     const PatchRecord& p = g.patches[index];
-    return p.exists() &&
-           (p.bottom() < s.patch.bottom() || (p.bottom() == s.patch.bottom() && greater(g, index, s)));
+    return p.exists() && (p.bottom < s.patch.bottom || (p.bottom == s.patch.bottom && greater(g, index, s)));
   }
 
   // Do finer patches of the subject's own grid cover a block of it? Where a block is absent its cells hold no
@@ -184,7 +192,7 @@ class Search {
   // weight.
   void offer(const Grid& g, std::size_t index, int level, int bx, int by) {
     const LatticeRect kernel = g.info.shape.kernel(level, bx, by);
-    const double bottom = g.patches[index].bottom();
+    const double bottom = g.patches[index].bottom;
     if (!g.patches[index].ragged()) {
       covers_.push_back({bottom, {&g.info.frame, grown(kernel, level)}});
       return;
@@ -240,7 +248,7 @@ bool less(const Grid& a, std::size_t ia, const Grid& b, std::size_t ib, Coverage
     if (std::abs(x - y) > kAreaDoubt * std::max(x, y)) return x < y;
     if (const int sign = compare_areas({&a.info.frame, ka}, {&b.info.frame, kb}, counts)) return sign < 0;
   }
-  const double za = a.patches[ia].bottom(), zb = b.patches[ib].bottom();
+  const double za = a.patches[ia].bottom, zb = b.patches[ib].bottom;
   if (za != zb) return za > zb;
   if (a.info.digest != b.info.digest) return a.info.digest < b.info.digest;
   return ia < ib;

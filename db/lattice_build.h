@@ -19,16 +19,15 @@ Lattice make_lattice(const GridShape& shape, int level, int first, int count, Sa
   tbb::parallel_for(first, first + count, [&](int r) {
     float* out = lattice.row(r);
     const bool beyond = r + 1 == aj.stored && aj.beyond();
-    for (int c = 0; c < ai.stored; ++c) {
-      double value;
-      if (beyond) {
-        const double last = along_i(c, aj.last);
-        value = last + aj.weight * (last - along_i(c, aj.before));
-      } else {
-        value = along_i(c, r * aj.step);
-      }
-      out[c] = float(std::nearbyint(value));
-    }
+    const auto value = [&](int c) -> double {
+      if (!beyond) return along_i(c, r * aj.step);
+      const double last = along_i(c, aj.last);
+      return last + aj.weight * (last - along_i(c, aj.before));
+    };
+    // Samples are codes already; only what is continued beyond the last of them must be rounded to one.
+    const int whole = beyond ? 0 : ai.beyond() ? ai.stored - 1 : ai.stored;
+    for (int c = 0; c < whole; ++c) out[c] = float(sample(c * ai.step, r * aj.step));
+    for (int c = whole; c < ai.stored; ++c) out[c] = float(std::nearbyint(value(c)));
   });
   lattice.extrapolate_ring();
   return lattice;

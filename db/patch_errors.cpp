@@ -207,7 +207,7 @@ class Reference {
 
 }  // namespace
 
-PatchErrors::PatchErrors(const GridShape& shape) : shape_(shape) {
+PatchErrors::PatchErrors(const GridShape& shape, const CellMasks& cells) : shape_(shape), cells_(cells) {
   const LatticeRect f = shape.footprint();
   for (int l = 0; l < shape.levels(); ++l) {
     const int ni = segments(f.i1, l), nj = segments(f.j1, l);
@@ -218,8 +218,11 @@ PatchErrors::PatchErrors(const GridShape& shape) : shape_(shape) {
 // The strip of columns [p0, p1) of one level: rows of the lattice taken to its positions, the last four kept.
 class PatchErrors::Strip {
  public:
-  Strip(const Lattice& lattice, const Positions& positions, int p0, int p1)
-      : lattice_(lattice), n_(p1 - p0), phase_(make_phase(positions, p0, p1, lattice.level())) {}
+  Strip(const Lattice& lattice, const CellMasks& masks, const Positions& positions, int p0, int p1)
+      : lattice_(lattice),
+        masks_(masks),
+        n_(p1 - p0),
+        phase_(make_phase(positions, p0, p1, lattice.level())) {}
 
   const RowUp& up(int r) {
     RowUp& u = ups_[(r + 4) & 3];
@@ -253,6 +256,7 @@ class PatchErrors::Strip {
     row = r;
     const int c0 = phase_.cell.front() - (phase_.t.front() == 0), c1 = phase_.cell.back() + 1;
     hidden_in_cells(lattice_, r, c0, c1, bends_, cells_);
+    if (!masks_.empty()) forget_unanswered(r, c0);
     at.resize(size_t(n_));
     for (std::size_t p = 0; p < at.size(); ++p) {
       const auto c = size_t(phase_.cell[p] - c0);
@@ -260,7 +264,16 @@ class PatchErrors::Strip {
     }
     return at;
   }
+  // A cell that does not answer is made of fill: what bends there is nobody's error.
+  void forget_unanswered(int r, int c0) {
+    const int level = lattice_.level(), j = std::clamp(r, 0, masks_.rows(level) - 1);
+    for (std::size_t k = 0; k < cells_.size(); ++k) {
+      const int i = std::clamp(c0 + int(k), 0, masks_.cols(level) - 1);
+      if (!(masks_.at(level, i, j) & CellMasks::kAnswering)) cells_[k] = 0;
+    }
+  }
   const Lattice& lattice_;
+  const CellMasks& masks_;
   int n_;
   Phase phase_;
   RowUp ups_[4];
@@ -279,7 +292,7 @@ void PatchErrors::measure(const Lattice& lattice, const Lattice& level0, std::sp
   const int first = y0 == 0 ? 0 : rows.place(y0), end = y1 == shape_.height() ? rows.n : rows.place(y1);
   for (int p0 = 0; p0 < positions.n; p0 += kStrip) {
     const int p1 = std::min(positions.n, p0 + kStrip), n = p1 - p0;
-    Strip strip(lattice, positions, p0, p1);
+    Strip strip(lattice, cells_, positions, p0, p1);
     std::vector<double> z(static_cast<size_t>(n)), linear(z), smooth(z);
     for (int s = 0; s < levels_[size_t(level)].nj; ++s) {
       const double from = s == 0 ? -1 : segment_start(s, level), to = segment_start(s + 1, level);
@@ -318,8 +331,12 @@ void PatchErrors::note(int level, int segment, const Positions& positions, int p
 std::array<double, 3> PatchErrors::of(int level, int bx, int by) const {
   const Level& l = levels_[size_t(level)];
   Ninth worst;
-  for (int s = std::max(0, 3 * by - 1); s <= std::min(l.nj - 1, 3 * by + 3); ++s)
-    for (int i = std::max(0, 3 * bx - 1); i <= std::min(l.ni - 1, 3 * bx + 3); ++i) {
+  // Five segments; behind the last block all that is left.
+  const auto end = [](int b, int blocks, int segments) {
+    return b + 1 == blocks ? segments : std::min(segments, 3 * b + 4);
+  };
+  for (int s = std::max(0, 3 * by - 1); s < end(by, shape_.blocks_j(level), l.nj); ++s)
+    for (int i = std::max(0, 3 * bx - 1); i < end(bx, shape_.blocks_i(level), l.ni); ++i) {
       const Ninth& n = l.ninths[size_t(s) * size_t(l.ni) + size_t(i)];
       worst = {std::max(worst.linear, n.linear), std::max(worst.smooth, n.smooth)};
     }

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "db/cell_masks.h"
 #include "db/grid_shape.h"
 #include "db/lattice.h"
 
@@ -26,7 +27,8 @@ namespace patchwork {
 /// k = 1 and k = 2 share the larger of their errors.
 class PatchErrors {
  public:
-  explicit PatchErrors(const GridShape& shape);
+  /// `cells` outlives it; empty where every cell holds data. Cells that do not answer hide nothing.
+  PatchErrors(const GridShape& shape, const CellMasks& cells);
   struct Positions;  ///< where along an axis errors are measured (patch_errors.cpp)
 
   /// Measures a level at the level-0 rows [y0, y1). `valid`: 1 where a sample of level0's rows holds data;
@@ -51,6 +53,7 @@ class PatchErrors {
   void note(int level, int segment, const Positions& positions, int p0, int p1, const double* linear,
             const double* smooth);
   GridShape shape_;
+  const CellMasks& cells_;
   std::vector<Level> levels_;
   std::mutex mutex_;
 };

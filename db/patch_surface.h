@@ -10,19 +10,21 @@
 
 namespace patchwork {
 
-/// Window coordinates: u = lattice i / 2^level - first_i, so that the block's domain spans [1, 33] and the
+/// Window coordinates: u = lattice i / 2^level - first_i, so that the block spans [3, 31] and the
 /// cell that holds u is floor(u); an interpolant reads the vertices floor(u) - 1 .. floor(u) + 2.
 struct PatchSurface {
-  static constexpr int kSide =
-      kKernelCells + 2 * kExtensionCells + 3;  ///< 35 vertices: 32 cells and one vertex around
+  /// 41 vertices: the block's cells, its extension, the feather behind a grid's last block, one vertex
+  /// around.
+  static constexpr int kSide = kKernelCells + kExtensionCells + kFeatherCells + 3;
 
   /// What is known of the window's cells where some hold no data.
   struct Holes {
     std::array<std::uint8_t, kSide * kSide> answering{};  ///< of the cell that starts at the vertex: 1 or 0
     std::array<std::uint8_t, kSide * kSide> real{};       ///< the same
-    std::array<std::uint8_t, kSide * kSide>
-        near{};  ///< vertex: every cell at it is real (weight factor, k = 0)
-    std::array<std::uint8_t, kSide * kSide> wide{};  ///< vertex: every cell within two is real (k = 1, 2)
+    /// Vertex: how far from cells without data, 0 at one to kFeatherCells where the weight is full; `near` of
+    /// the vertex (k = 0), `wide` the least of it and its eight neighbours (k = 1, 2: a cubic B-spline
+    /// spreads a vertex two cells wide).
+    std::array<std::uint8_t, kSide * kSide> near{}, wide{};
   };
 
   PatchId id;
@@ -33,10 +35,6 @@ struct PatchSurface {
   std::unique_ptr<const Holes> holes;  ///< null for a patch without
 };
 
-/// Cells within this distance of one without data are faded (and not offered as cover): what a cubic B-spline
-/// reads.
-inline constexpr int kHoleFadeCells = 3;
-
 /// Cells of one level, asked by lattice index; true if real / answering. Indices beyond the grid mean its
 /// border cell.
 class CellSource {
@@ -45,11 +43,11 @@ class CellSource {
   virtual std::uint8_t cell(int i, int j) const = 0;  ///< CellMasks::Cell bits
 };
 
-/// The holes of the window of block (bx, by); null if every cell of the window and around it is real.
-std::unique_ptr<const PatchSurface::Holes> make_holes(const CellSource& cells, int bx, int by);
+/// The holes of the window of block (bx, by); null if no hole is in it or near enough to fade it.
+std::unique_ptr<const PatchSurface::Holes> make_holes(const CellSource& cells, int level, int bx, int by);
 
 /// What block (bx, by) can offer as cover: at most eight disjoint rectangles of cells at full weight, found
 /// greedily.
-Offer make_offer(const CellSource& cells, int bx, int by);
+Offer make_offer(const CellSource& cells, int level, int bx, int by);
 
 }  // namespace patchwork

@@ -20,7 +20,8 @@ struct Facts {
   int width = 0, height = 0;
   Frame frame;
   bool pixel_is_area = true, integer_samples = false, float_is_exact = false;
-  double accuracy = 0, scale = 1, offset = 0;
+  double accuracy = 0, scale = 1, offset = 0;  // accuracy: as claimed
+  CostField cost;                              // of a warp, raw units
   int sample_bytes = 1;
   std::vector<std::string> warnings;
   std::unique_ptr<raster_impl::Rows> rows;
@@ -63,20 +64,20 @@ Facts describe(const RawGrid& raw) {
   return f;
 }
 
-// Replaces the grid by its warped form; returns what that may cost, metres.
-double warp_into(Facts& f, RawGrid& raw, const OGRSpatialReference& target) {
+// Replaces the grid by its warped form, and notes what that may cost.
+void warp_into(Facts& f, RawGrid& raw, const OGRSpatialReference& target) {
   auto warped = raster_impl::warp(raw, target);
-  const double cost = warped.cost * std::abs(raw.scale);
+  f.cost = std::move(warped.cost);
+  const double cost = f.cost.largest() * std::abs(raw.scale);
   f.warnings.push_back("warped from " + raster_impl::crs_label(*raw.crs) + " to " +
                        raster_impl::crs_label(target) + ", " + size_text(raw.width, raw.height) + " to " +
-                       size_text(warped.width, warped.height) + " samples; " + metres_up(cost) +
-                       " added to its accuracy");
+                       size_text(warped.width, warped.height) + " samples; up to " + metres_up(cost) +
+                       " added to its accuracy, by place");
   f.integer_samples = f.float_is_exact = false;
   f.width = warped.width;
   f.height = warped.height;
   raw.geotransform = warped.geotransform;
   raw.rows = std::move(warped.rows);
-  return cost;
 }
 
 // `quantum`: metres between the file's neighbouring values, 0 for floats; a warp does not undo it.
@@ -98,10 +99,9 @@ Facts finish(RawGrid raw, const RasterOptions& options, const std::string& datab
   Facts f = describe(raw);
   if (target) f.crs = raster_impl::to_wkt2(*target);
   const double quantum = f.integer_samples ? std::abs(f.scale) : 0;
-  double cost = 0;
-  if (target && raw.crs && !raster_impl::same_crs(*raw.crs, *target)) cost = warp_into(f, raw, *target);
+  if (target && raw.crs && !raster_impl::same_crs(*raw.crs, *target)) warp_into(f, raw, *target);
   f.frame = raw.frame();
-  f.accuracy = cost + (options.accuracy ? *options.accuracy : assumed_accuracy(f, quantum));
+  f.accuracy = options.accuracy ? *options.accuracy : assumed_accuracy(f, quantum);
   f.rows = std::move(raw.rows);
   return f;
 }
@@ -138,7 +138,12 @@ int RasterSource::height() const { return impl_->height; }
 const Frame& RasterSource::frame() const { return impl_->frame; }
 bool RasterSource::pixel_is_area() const { return impl_->pixel_is_area; }
 const std::string& RasterSource::crs() const { return impl_->crs; }
-double RasterSource::accuracy() const { return impl_->accuracy; }
+double RasterSource::accuracy() const {
+  return impl_->accuracy + impl_->cost.largest() * std::abs(impl_->scale);
+}
+double RasterSource::accuracy_in(const LatticeRect& cells) const {
+  return impl_->accuracy + impl_->cost.most(cells) * std::abs(impl_->scale);
+}
 bool RasterSource::integer_samples() const { return impl_->integer_samples; }
 double RasterSource::scale() const { return impl_->scale; }
 double RasterSource::offset() const { return impl_->offset; }

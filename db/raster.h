@@ -51,7 +51,10 @@ class RasterSource {
   const Frame& frame() const;      ///< in the database's CRS
   bool pixel_is_area() const;      ///< the footprint reaches half a cell beyond the outer samples
   const std::string& crs() const;  ///< WKT2 of the database's CRS, empty where neither names one
-  double accuracy() const;         ///< metres, cost of a warp included
+  double accuracy() const;         ///< metres, cost of a warp included where it is largest
+  /// The same for a rectangle of the grid's cells: a warp costs where the ground bends, and no more than it
+  /// does there.
+  double accuracy_in(const LatticeRect& cells) const;
   /// True: a height is exactly `scale() * n + offset()` for an integer sample n (no warp to other heights).
   bool integer_samples() const;
   double scale() const;   ///< metres per raw unit (band scale times unit)

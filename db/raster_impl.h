@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "db/cost_field.h"
 #include "db/error.h"
 #include "db/raster.h"
 
@@ -87,7 +88,7 @@ struct WarpedGrid {
   int width = 0, height = 0;
   std::array<double, 6> geotransform{};
   std::unique_ptr<Rows> rows;
-  double cost = 0;  ///< raw units: the largest difference found between the two surfaces
+  CostField cost;  ///< raw units: the largest differences found between the two surfaces
 };
 
 /// Bilinear samples of `source` on a grid of `target` in the source's orientation, with the source's steps.

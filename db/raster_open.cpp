@@ -171,6 +171,18 @@ std::vector<double> nodata_of(GDALRasterBand& band, const RasterOptions& options
   return kept;
 }
 
+// GDAL calls a block empty too that lies in a hole of the file system, as written zeros may.
+bool every_block_is_in_the_file(GDALRasterBand& band) {
+  int across = 0, down = 0;
+  band.GetBlockSize(&across, &down);
+  for (int y = 0; y * down < band.GetYSize(); ++y)
+    for (int x = 0; x * across < band.GetXSize(); ++x) {
+      const std::string name = "BLOCK_OFFSET_" + std::to_string(x) + "_" + std::to_string(y);
+      if (!band.GetMetadataItem(name.c_str(), "TIFF")) return false;
+    }
+  return true;
+}
+
 // Blocks that were never written read as zeros where no nodata value is declared: heights that nobody
 // measured.
 void refuse_missing_blocks(GDALRasterBand& band, const RawGrid& grid) {
@@ -178,7 +190,7 @@ void refuse_missing_blocks(GDALRasterBand& band, const RawGrid& grid) {
   if (std::binary_search(grid.nodata.begin(), grid.nodata.end(), 0.0)) return;
   const int status =
       band.GetDataCoverageStatus(0, 0, grid.width, grid.height, GDAL_DATA_COVERAGE_STATUS_EMPTY, nullptr);
-  if (status & GDAL_DATA_COVERAGE_STATUS_EMPTY)
+  if (status & GDAL_DATA_COVERAGE_STATUS_EMPTY && !every_block_is_in_the_file(band))
     throw Error(grid.path, "ends early or is damaged: parts of it were cut off or never written",
                 "get the file again, or give --nodata 0 if its zeros mean no data");
 }

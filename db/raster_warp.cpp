@@ -265,9 +265,10 @@ void resample(const RawGrid& source, Transform& transform, const Samples& from, 
   }
 }
 
-// The largest difference of the surfaces of `a` and `b` at the points of `a`'s lattice divided by `parts`.
-double largest_difference(const Samples& a, const Samples& b, Transform& transform, bool back, int parts) {
-  double largest = 0;
+// Notes the differences of the surfaces of `a` and `b` at the points of `a`'s lattice divided by `parts`, by
+// their place in the destination: `b`'s lattice, or with `back` `a`'s.
+void note_differences(const Samples& a, const Samples& b, Transform& transform, bool back, int parts,
+                      CostField& cost) {
   std::vector<double> x(static_cast<std::size_t>((a.width - 1) * parts + 1)), y(x.size());
   const double reach = back ? 0.5 : 0;
   for (int j = 0; j <= (a.height - 1) * parts; ++j) {
@@ -277,10 +278,9 @@ double largest_difference(const Samples& a, const Samples& b, Transform& transfo
     for (std::size_t i = 0; i < x.size(); ++i) {
       const double d = std::abs(surface(a, static_cast<double>(i) / parts, v, 0) -
                                 surface(b, x[i] - 0.5, y[i] - 0.5, reach));
-      if (d > largest) largest = d;
+      if (d > 0) back ? cost.note(double(i) / parts, v, d) : cost.note(x[i] - 0.5, y[i] - 0.5, d);
     }
   }
-  return largest;
 }
 
 std::unique_ptr<Samples> load(const RawGrid& source) {
@@ -332,8 +332,9 @@ WarpedGrid warp(const RawGrid& source, const OGRSpatialReference& target) {
                 "choose its CRS for the database");
   // Positions are ten times as exact here, so that their own error is part of what is measured.
   Transform finer(source, target, out.geotransform, kPositionError / 10);
-  out.cost = std::max(largest_difference(*from, *to, finer, false, 1),
-                      largest_difference(*to, *from, finer, true, 2));
+  out.cost = CostField(out.width, out.height);
+  note_differences(*from, *to, finer, false, 1, out.cost);
+  note_differences(*to, *from, finer, true, 2, out.cost);
   out.rows = std::make_unique<SampleRows>(std::move(to));
   return out;
 }

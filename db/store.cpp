@@ -2,6 +2,7 @@
 #include "db/store.h"
 
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstring>
@@ -32,10 +33,25 @@ constexpr const char* kSchema = R"(
 )";
 constexpr std::int64_t kOffersRun = 1 << 30;  // the run of `patches` that holds a grid's offers
 
+// In a folder that is read-only SQLite cannot make the -shm file that a reader needs; where no -wal lies
+// beside it, the file alone is the whole state. CAVEAT: a writer with more rights than ours is then not seen.
+bool is_frozen(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
+  return access(folder.c_str(), W_OK) != 0 && !std::filesystem::exists(path + "-wal");
+}
+
+std::string frozen_uri(const std::string& path) {
+  std::string uri = "file:";
+  for (const char c : path) uri += c == '%' ? "%25" : c == '?' ? "%3f" : c == '#' ? "%23" : std::string(1, c);
+  return uri + "?immutable=1";
+}
+
 std::string advice_for(int code) {
   switch (code & 0xff) {
     case SQLITE_FULL:
       return "free some space; the database is as it was before";
+    case SQLITE_IOERR:
+      return "check the disk and its free space; the database is as it was before";
     case SQLITE_BUSY:
       return "another process is writing; try again when it is done";
     case SQLITE_READONLY:
@@ -209,7 +225,10 @@ Store Store::open(const std::string& path, Mode mode) {
   if (mode != Mode::create && !std::filesystem::exists(path))
     throw Error(path, "there is no such database", "make one with: patchwork import DB FILE...");
   if (std::filesystem::is_directory(path)) throw Error(path, "it is a folder", "name a database file");
-  if (sqlite3_open_v2(path.c_str(), &impl->db, flags | SQLITE_OPEN_NOMUTEX, nullptr) != SQLITE_OK)
+  const bool frozen = mode == Mode::read && is_frozen(path);
+  const std::string name = frozen ? frozen_uri(path) : path;
+  const int how = flags | SQLITE_OPEN_NOMUTEX | (frozen ? SQLITE_OPEN_URI : 0);
+  if (sqlite3_open_v2(name.c_str(), &impl->db, how, nullptr) != SQLITE_OK)
     throw Error(path, sqlite3_errmsg(impl->db), advice_for(SQLITE_CANTOPEN));
   sqlite3_extended_result_codes(impl->db, 1);
   sqlite3_busy_timeout(impl->db, kBusyMilliseconds);

@@ -39,7 +39,7 @@ Extraction extract(const Database& db, const UniformCut& cut) {
         const std::size_t index = grid.info.shape.index(e.id.level(), e.id.bx(), e.id.by());
         const PatchRecord& p = grid.patches[index];
         // The tree's boxes are rounded outward; the record decides.
-        const double bottom = p.bottom();
+        const double bottom = p.bottom;
         if (cut.error >= p.top || (bottom > cut.error && (cut.strict || !p.best()))) return;
         if (cut.region.meets(grid, {e.id.level(), e.id.bx(), e.id.by()}))
           found.push_back({bottom, &grid, index, e.id});

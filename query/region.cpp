@@ -61,8 +61,13 @@ Region Region::parse_polygon(const std::string& text) {
   std::replace(numbers.begin(), numbers.end(), ',', ' ');
   std::istringstream in(numbers);
   std::vector<Point> corners;
-  for (Point p; in >> p.x >> p.y;) corners.push_back(p);
-  if (!in.eof()) throw Error("polygon", "cannot read \"" + text + "\"", "write it as \"x y, x y, x y\"");
+  bool paired = true;
+  for (Point p; in >> p.x;) {
+    paired = bool(in >> p.y);
+    if (paired) corners.push_back(p);
+  }
+  if (!in.eof() || !paired)
+    throw Error("polygon", "cannot read \"" + text + "\"", "write it as \"x y, x y, x y\"");
   return inside(std::move(corners));
 }
 

@@ -44,18 +44,19 @@ void Resampler::rows(int factor, int row, int rows, std::span<float* const> band
   const int width = (raster_.width + factor - 1) / factor;
   const std::size_t n = size_t(width) * size_t(rows);
   BlendOutput out;
-  for (const std::string& b : bands_) {
-    if (b == "height") height_.resize(n), out.height = height_;
-    if (b == "bound") bound_.resize(n), out.bound = bound_;
-    if (b == "source") source_.resize(n), out.source = source_;
+  for (std::size_t b = 0; b < bands_.size(); ++b) {
+    if (bands_[b] == "height") out.height32 = {bands[b], n};
+    if (bands_[b] == "bound") bound_.resize(n), out.bound = bound_;
+    if (bands_[b] == "source") source_.resize(n), out.source = source_;
   }
   const BlendCounts c = blend_.at_pixels(raster_.frame(factor), width, row, rows, out);
-  for (std::size_t b = 0; b < bands_.size(); ++b)
+  for (std::size_t b = 0; b < bands_.size(); ++b) {
+    if (bands_[b] == "height" && bands[b] == out.height32.data()) continue;
     tbb::parallel_for(0, rows, [&](int r) {
       const std::size_t from = size_t(r) * size_t(width), to = from + size_t(width);
       float* f = bands[b];
       if (bands_[b] == "height")
-        std::copy(height_.begin() + long(from), height_.begin() + long(to), f + from);
+        std::copy(out.height32.begin() + long(from), out.height32.begin() + long(to), f + from);
       if (bands_[b] == "source")
         std::copy(source_.begin() + long(from), source_.begin() + long(to), f + from);
       // A bound is rounded up, or it would not be one.
@@ -65,6 +66,7 @@ void Resampler::rows(int factor, int row, int rows, std::span<float* const> band
           f[k] = double(e) < bound_[k] ? std::nextafterf(e, INFINITY) : e;
         }
     });
+  }
   if (factor == 1) {
     tally_.full.points += c.points, tally_.full.contributions += c.contributions;
     tally_.full.most = std::max(tally_.full.most, c.most);

@@ -43,7 +43,7 @@ class Resampler {
   Raster raster_;
   std::vector<std::string> bands_;
   ResampleTally tally_;
-  std::vector<double> height_, bound_;
+  std::vector<double> bound_;
   std::vector<std::int32_t> source_;
 };
 

@@ -53,13 +53,14 @@ struct Terrain {
   GridShape shape;
   std::vector<double> codes;
   std::vector<Lattice> levels;
+  CellMasks whole;
 };
 
 TEST(PatchErrors, BoundEveryPointOfTheDomainAndAreExactForBilinearPatches) {
   const std::uint64_t seed = test_seed(1);
   for (const bool area : {false, true}) {
     const Terrain t(75, 61, area, seed);
-    PatchErrors errors(t.shape);
+    PatchErrors errors(t.shape, t.whole);
     t.measure(errors, 20);
     for (int l = 0; l < t.shape.levels(); ++l)
       for (int by = 0; by < t.shape.blocks_j(l); ++by)
@@ -78,7 +79,7 @@ TEST(PatchErrors, BoundEveryPointOfTheDomainAndAreExactForBilinearPatches) {
 
 TEST(PatchErrors, DoNotDependOnHowRowsAreShared) {
   const Terrain t(75, 61, true, test_seed(2));
-  PatchErrors a(t.shape), b(t.shape);
+  PatchErrors a(t.shape, t.whole), b(t.shape, t.whole);
   t.measure(a, 61), t.measure(b, 7);
   for (int l = 0; l < t.shape.levels(); ++l)
     for (int by = 0; by < t.shape.blocks_j(l); ++by)
@@ -87,7 +88,7 @@ TEST(PatchErrors, DoNotDependOnHowRowsAreShared) {
 
 TEST(PatchErrors, AreZeroOnFlatGround) {
   const Terrain t(75, 61, true, 0, true);
-  PatchErrors errors(t.shape);
+  PatchErrors errors(t.shape, t.whole);
   t.measure(errors, 61);
   for (int l = 0; l < t.shape.levels(); ++l) EXPECT_EQ(errors.of(l, 0, 0), (std::array<double, 3>{0, 0, 0}));
 }

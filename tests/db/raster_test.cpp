@@ -145,6 +145,13 @@ TEST_F(RasterTest, DamagedBytesOfACompressedFileAreRefused) {
   EXPECT_SAYS(refusal(path), "ends early or is damaged near rows");
 }
 
+// GDAL writes zeros as a hole of the file system and then takes the block for one that was never written.
+TEST_F(RasterTest, ZerosThatWereWrittenAreHeights) {
+  const std::string path = make({.width = 200, .height = 200, .at = [](int, int) { return 0.0; }});
+  const std::vector<double> all = samples(open(path), 100);
+  EXPECT_EQ(std::count(all.begin(), all.end(), 0.0), 40000);
+}
+
 TEST_F(RasterTest, BlocksNeverWrittenAreHolesWhereNodataIsDeclaredAndRefusedElsewhere) {
   const auto sparse = [&](std::optional<double> nodata, const char* tiled = "TILED=YES") {
     const std::string path = in_directory("sparse.tif");

@@ -2,10 +2,12 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <optional>
 
 #include "db/error.h"
 #include "tools/cli.h"
 #include "tools/compare.h"
+#include "tools/unfinished_files.h"
 
 namespace patchwork::cli {
 
@@ -21,19 +23,17 @@ struct Options {
 // A database that this run made is taken away again if nothing came into it.
 class NewFileGuard {
  public:
-  explicit NewFileGuard(std::string path)
-      : path_(std::move(path)), is_new_(!std::filesystem::exists(path_)) {}
-  ~NewFileGuard() {
-    if (!is_new_ || kept_) return;
-    std::error_code ignored;
-    for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(path_ + suffix, ignored);
+  explicit NewFileGuard(const std::string& path) : is_new_(!std::filesystem::exists(path)) {
+    if (is_new_) files_.emplace(std::vector<std::string>{path, path + "-wal", path + "-shm"});
   }
-  void keep() { kept_ = true; }
+  void keep() {
+    if (files_) files_->keep();
+  }
   bool is_new() const { return is_new_; }
 
  private:
-  std::string path_;
-  bool is_new_, kept_ = false;
+  bool is_new_;
+  std::optional<UnfinishedFiles> files_;
 };
 
 RasterSource open_source(const Options& o, const std::vector<std::string>& files, const std::string& crs) {
@@ -115,9 +115,13 @@ class ImportRun {
     if (!guard_.is_new() || opened_) db = Database::open_or_create(o_.database, "", common_.memory);
     if (db && !o_.crs.empty() && db->crs() != o_.crs && !same_crs(db->crs(), o_.crs))
       throw Error(o_.database, "its CRS is not " + o_.crs, "leave --crs out, or make another database");
-    const RasterSource source = open_source(o_, files, db && !db->grids().empty() ? db->crs() : o_.crs);
+    const bool settled = db && (!db->grids().empty() || !db->crs().empty());
+    const RasterSource source = open_source(o_, files, settled ? db->crs() : o_.crs);
+    if (settled && db->crs().empty() && !source.crs().empty())
+      throw Error(files.front(), "it has a CRS and the database has none: their places cannot be compared",
+                  "make a database with --crs and import its grids there");
     for (const std::string& w : source.warnings()) note(common_, files.front() + ": " + w);
-    if (!db) db = Database::open_or_create(o_.database, source.crs(), common_.memory);
+    if (!settled) db = Database::open_or_create(o_.database, source.crs(), common_.memory);
     opened_ = true;
     std::optional<Comparison> compared;
     if (o_.dry_run) compared = compare(*db, source);

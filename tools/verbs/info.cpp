@@ -58,7 +58,7 @@ Json describe(const Database& db) {
       if (!p.exists()) continue;
       const auto level = size_t(g.info.shape.block(k).level);
       if (by_level.size() <= level) by_level.resize(level + 1);
-      smallest = patches == 0 ? p.bottom() : std::min(smallest, p.bottom());
+      smallest = patches == 0 ? p.bottom : std::min(smallest, p.bottom);
       ++patches, ++by_level[level], dormant += p.dormant();
     }
   Json levels = Json::object();

@@ -24,7 +24,7 @@ Json json_of(const Database& db, PatchId id) {
           {"block", {id.bx(), id.by()}},
           {"centre", {c.x, c.y}},
           {"size", {(k.i1 - k.i0) * g.info.frame.step_i(), (k.j1 - k.j0) * g.info.frame.step_j()}},
-          {"bottom", p.bottom()},
+          {"bottom", p.bottom},
           {"top", std::isfinite(p.top) ? Json(p.top) : Json(nullptr)}};
 }
 
@@ -41,7 +41,7 @@ void print_text(const Database& db, const Extraction& x, const Options& o) {
     const Json j = json_of(db, id);
     fmt::print("{:<20} {:>5} {:>9} {:>14.2f} {:>14.2f} {:>9.4g} {:>9.4g}\n", j["grid"].get<std::string>(),
                id.level(), fmt::format("{},{}", id.bx(), id.by()), j["centre"][0].get<double>(),
-               j["centre"][1].get<double>(), db.patch(id).bottom(), db.patch(id).top);
+               j["centre"][1].get<double>(), db.patch(id).bottom, db.patch(id).top);
   }
 }
 

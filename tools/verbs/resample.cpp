@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "db/error.h"
 #include "render/hillshade.h"
@@ -110,10 +111,18 @@ void draw_map(const Database& db, const Blend& blend, const Raster& r, const Opt
   write_png(o.map, patch_map(input));
 }
 
+// What is written takes the place of a file of that name: the database itself must not be it.
+void refuse_same_file(const std::string& out, const std::string& database) {
+  std::error_code absent;
+  if (std::filesystem::equivalent(out, database, absent))
+    throw Error(out, "it is the database itself", "write to another file");
+}
+
 void run(const Options& o, const Common& common) {
   const auto start = std::chrono::steady_clock::now();
   const Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  for (const std::string& out : {o.out, o.hillshade, o.map}) refuse_same_file(out, o.database);
   const Extent extent = o.region.extent.empty() ? db.extent() : o.region.region().bounds();
   const Raster raster = Raster::covering(extent, o.step > 0 ? o.step : finest_step(db, extent));
   const double open_seconds = seconds_since(start);

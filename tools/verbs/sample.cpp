@@ -70,6 +70,13 @@ class Sampler {
     flush();
   }
 
+  /// How many points there were, and how many patches were read for one.
+  std::string summary() const {
+    const double mean = counts_.points ? double(counts_.contributions) / double(counts_.points) : 0;
+    return fmt::format("{} points from {} patches; {:.3f} patches read a point, {} at most", counts_.points,
+                       patches_.size(), mean, counts_.most);
+  }
+
  private:
   bool header(std::string_view line) {
     int column = 0;
@@ -84,7 +91,10 @@ class Sampler {
 
   void flush() {
     height_.resize(x_.size()), bound_.resize(x_.size()), source_.resize(x_.size());
-    blend_.at_points(x_, y_, {.height = height_, .bound = bound_, .source = source_, .patch = {}});
+    const BlendCounts c =
+        blend_.at_points(x_, y_, {.height = height_, .bound = bound_, .source = source_, .patch = {}});
+    counts_.points += c.points, counts_.contributions += c.contributions,
+        counts_.most = std::max(counts_.most, c.most);
     fmt::memory_buffer out;
     for (std::size_t k = 0; k < x_.size(); ++k) {
       if (source_[k] == 0) {
@@ -95,9 +105,8 @@ class Sampler {
       fmt::format_to(std::back_inserter(out), "{} {} {} {} {}{}\n", x_[k], y_[k], height_[k], bound_[k], name,
                      source_[k] < 0 ? "(filled)" : "");
     }
-    if (std::fwrite(out.data(), 1, out.size(), stdout) != out.size())
-      throw Error("standard output", "it cannot be written");
-    std::fflush(stdout);
+    if (std::fwrite(out.data(), 1, out.size(), stdout) != out.size() || std::fflush(stdout) != 0)
+      throw Error("standard output", "it cannot be written", "is the disk full?");
     x_.clear(), y_.clear();
   }
 
@@ -107,6 +116,7 @@ class Sampler {
   int columns_[2] = {0, 1};
   std::vector<double> x_, y_, height_, bound_;
   std::vector<std::int32_t> source_;
+  BlendCounts counts_;
 };
 
 }  // namespace
@@ -120,7 +130,9 @@ void add_sample(CLI::App& app, Common& common) {
   v->callback([o, &common] {
     const Database db = Database::open(o->database, common.memory);
     std::ios::sync_with_stdio(false);
-    Sampler(db, *o).read(std::cin);
+    Sampler sampler(db, *o);
+    sampler.read(std::cin);
+    note(common, sampler.summary());
   });
 }
 

@@ -1,0 +1,152 @@
+// BoundHolds (hard cases): no height leaves its bound, and priority keeps to the bound that was asked for.
+#include <gtest/gtest.h>
+
+#include "tests/blend/scene.h"
+
+namespace patchwork {
+namespace {
+
+constexpr double kErrors[] = {0, 1, 5, 20, 100};
+// Kernels that cover are grown by 1/1024 of a cell: in such a hairline a ramp is that far from 1.
+constexpr double kHairline = 1.0 / 512;
+
+class BoundHolds : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { scene_ = std::make_unique<Scene>(surveys()); }
+  static void TearDownTestSuite() { scene_.reset(); }
+  static const Database& db() { return scene_->db(); }
+  static std::unique_ptr<Scene> scene_;
+};
+std::unique_ptr<Scene> BoundHolds::scene_;
+
+TEST_F(BoundHolds, AgainstTheTerrainThatWasSurveyed) {
+  std::mt19937_64 random(test_seed(1));
+  const Points points = random_points(db().extent(), 20000, random);
+  double closest = 0;
+  for (const double e : kErrors)
+    for (const BlendOptions& options : all_blends()) {
+      const Answers a = evaluate(db(), e, points, options);
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        if (a.source[k] == 0) continue;
+        const double off = std::abs(a.height[k] - hills(points.x[k], points.y[k]));
+        closest = std::max(closest, off / a.bound[k]);
+        ASSERT_LE(off, a.bound[k]) << name_of(options) << " error " << e << " at " << points.x[k] << " "
+                                   << points.y[k];
+      }
+    }
+  EXPECT_GT(closest, 0.5) << "negative control: half the bound would do, so this test could not fail";
+}
+
+TEST_F(BoundHolds, IsWhatWasAskedForWhereverAKernelOffersIt) {
+  std::mt19937_64 random(test_seed(2));
+  const Points points = random_points(db().extent(), 4000, random);
+  std::vector<double> asked(std::begin(kErrors), std::end(kErrors));
+  for (const Grid& g : db().grids()) asked.push_back(g.info.accuracy + g.info.quantisation);
+  std::size_t weighted_beyond = 0;
+  for (const double e : asked) {
+    std::vector<bool> offered(points.size());
+    each_patch(db(), [&](const Grid& g, std::size_t index, const GridShape::Block& b) {
+      if (g.patches[index].bottom > e) return;
+      const LatticeRect kernel = g.info.shape.kernel(b.level, b.bx, b.by);
+      for (std::size_t k = 0; k < points.size(); ++k)
+        if (!offered[k]) offered[k] = holds(g, kernel, {points.x[k], points.y[k]});
+    });
+    const Extraction x = extract(db(), {.error = e});
+    for (int smoothness = 0; smoothness <= 2; ++smoothness) {
+      // At level 0 a smooth surface may depart further from the samples' than the bottom says (grid.h).
+      double most = e;
+      for (const PatchId id : x.patches)
+        if (db().patch(id).bottom <= e) most = std::max(most, db().patch(id).error[size_t(smoothness)]);
+      const Answers a = evaluate(db(), x.patches, points, {.smoothness = smoothness});
+      for (std::size_t k = 0; k < points.size(); ++k)
+        if (offered[k]) {
+          ASSERT_LE(a.bound[k], most + kHairline * x.bound_max)
+              << "k=" << smoothness << " error " << e << " at " << points.x[k] << " " << points.y[k];
+        }
+    }
+    const Answers w = evaluate(db(), x.patches, points, {.composition = Composition::weighted});
+    for (std::size_t k = 0; k < points.size(); ++k)
+      weighted_beyond += offered[k] && w.bound[k] > e + kHairline * x.bound_max;
+  }
+  EXPECT_GT(weighted_beyond, 0u) << "negative control: the weighted blend is diluted by coarse neighbours";
+}
+
+TEST_F(BoundHolds, OfOneGridAgainstItsOwnBilinearSurface) {
+  const GridFile file =
+      survey({.width = 150, .height = 130, .geotransform = rotated(100, 1500, 25, 9, 7)}, 0.3);
+  const Scene one({file});
+  const Grid& g = one.db().grids()[0];
+  std::mt19937_64 random(test_seed(3));
+  std::uniform_real_distribution<double> i(0, file.width - 1), j(0, file.height - 1);
+  Points points;
+  std::vector<double> surface;
+  for (int k = 0; k < 20000; ++k) {
+    // Every fourth point on a vertex, where the distance of bilinear patches is largest.
+    const double u = k % 4 ? i(random) : std::round(i(random)), v = k % 4 ? j(random) : std::round(j(random));
+    const int a = std::min(int(u), file.width - 2), b = std::min(int(v), file.height - 2);
+    const double s = u - a, t = v - b;
+    surface.push_back((1 - t) * ((1 - s) * file.at(a, b) + s * file.at(a + 1, b)) +
+                      t * ((1 - s) * file.at(a, b + 1) + s * file.at(a + 1, b + 1)));
+    points.add(g.info.frame.to_domain(u, v));
+  }
+  for (const double e : kErrors)
+    for (const BlendOptions& options : all_blends()) {
+      const Answers answers = evaluate(one.db(), e, points, options);
+      double closest = 0;
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        const double off = std::abs(answers.height[k] - surface[k]);
+        const double allowed = answers.bound[k] - g.info.accuracy + 1e-4;  // float32 samples
+        closest = std::max(closest, off / allowed);
+        ASSERT_LE(off, allowed) << name_of(options) << " error " << e;
+      }
+      if (options.smoothness == 0 && options.composition == Composition::priority && e >= 5) {
+        EXPECT_GT(closest, 0.5) << "negative control: half the bound would do at error " << e;
+      }
+    }
+}
+
+// The half cell beyond the outer samples is extrapolated, and its bound is larger: it must not be mixed into
+// places where another patch keeps to the error.
+TEST(BoundAtTheRim, OfAPixelIsAreaGridKeepsToTheErrorOfWhatLiesBelow) {
+  GridFile rough{.width = 60, .height = 60, .geotransform = {600, 5, 0, 500, 0, -5}, .accuracy = 0.1};
+  rough.at = [](int i, int j) { return 100 + 4.0 * ((i * 7 + j * 13) % 5); };
+  // The base does not cover the rough grid's kernels, or it would hide them at its own error.
+  GridFile base{.width = 80, .height = 80, .geotransform = {0, 10, 0, 800, 0, -10}, .accuracy = 1};
+  base.at = [](int, int) { return 105.0; };
+  const Scene scene({base, rough});
+  std::mt19937_64 random(test_seed(4));
+  Points points = random_points({600, 200, 720, 202.5}, 500, random);
+  for (const BlendOptions& options : all_blends()) {
+    if (options.composition != Composition::priority) continue;
+    const Answers a = evaluate(scene.db(), 1.0, points, options);
+    for (std::size_t k = 0; k < points.size(); ++k)
+      ASSERT_LE(a.bound[k], 1.0) << name_of(options) << " at " << points.x[k] << " " << points.y[k];
+  }
+}
+
+// A mean of equal bounds is that bound: rounding must not put it above what was asked for.
+TEST(StrictBlend, AnswersEverywhereWhereTheErrorIsExactlyWhatThereIs) {
+  std::vector<GridFile> grids;
+  for (int n = 0; n < 4; ++n) {
+    GridFile g{.width = 60, .height = 50, .geotransform = rotated(100.0 * n, 300, 13.0 * n, 5, 5)};
+    g.accuracy = 0.1, g.at = [](int, int) { return 50.0; };
+    grids.push_back(g);
+  }
+  const Scene scene(grids);
+  const double e = scene.db().grids()[0].at(0, 0, 0).bottom;
+  std::mt19937_64 random(test_seed(5));
+  const Points points = random_points(scene.db().extent(), 20000, random);
+  for (BlendOptions options : all_blends()) {
+    const Answers loose = evaluate(scene.db(), e, points, options);
+    options.strict = true;
+    const Answers strict = evaluate(scene.db(), e, points, options);
+    EXPECT_TRUE(loose == strict) << name_of(options);
+    options.error = e;
+    const Answers below = evaluate(scene.db(), e / 2, points, options);
+    EXPECT_EQ(std::count(below.source.begin(), below.source.end(), 0), std::ptrdiff_t(points.size()))
+        << "negative control: half the error is not available";
+  }
+}
+
+}  // namespace
+}  // namespace patchwork

@@ -1,0 +1,148 @@
+// ContinuityCk (hard cases): across every rim the derivatives up to k are continuous, and derivative k + 1 is
+// not.
+#include <gtest/gtest.h>
+
+#include "tests/blend/scene.h"
+
+namespace patchwork {
+namespace {
+
+// A place on a line where the formula of the surface changes, and the direction across it.
+struct Crossing {
+  Point at, across;
+};
+
+// A quarter of the step leaves a quarter of the difference where a derivative is continuous, all of a jump.
+constexpr double kFalls = 0.35;
+
+constexpr double kBinomial[4][4] = {{1, 0, 0, 0}, {1, -1, 0, 0}, {1, -2, 1, 0}, {1, -3, 3, -1}};
+
+// The jump of derivative j over each crossing: one-sided differences with step h on either side.
+std::vector<double> jumps(const Database& db, double error, const BlendOptions& options,
+                          const std::vector<Crossing>& crossings, int j, double h) {
+  Points points;
+  for (const Crossing& c : crossings)
+    for (const int side : {1, -1})
+      for (int n = 0; n <= j; ++n) {
+        const double s = side * h * (n + 0.5);
+        points.add(c.at.x + s * c.across.x, c.at.y + s * c.across.y);
+      }
+  const Answers a = evaluate(db, error, points, options);
+  std::vector<double> result;
+  for (std::size_t c = 0, at = 0; c < crossings.size(); ++c) {
+    double derivative[2] = {0, 0};
+    for (const int side : {0, 1})
+      for (int n = 0; n <= j; ++n) {
+        const double sign = side == 0 && j % 2 == 1 ? -1 : 1;  // differences run outward
+        derivative[side] += sign * kBinomial[j][n] * a.height[at++];
+      }
+    result.push_back(std::abs(derivative[0] - derivative[1]) / std::pow(h, j));
+  }
+  return result;
+}
+
+double largest(const std::vector<double>& v) {
+  double most = 0;
+  for (const double x : v)
+    if (x > most) most = x;  // NaN: a stencil that leaves the data
+  return most;
+}
+
+// Random points on the edges of a lattice rectangle.
+void add_edges(const Grid& g, const LatticeRect& r, std::mt19937_64& random, std::vector<Crossing>& out) {
+  std::uniform_real_distribution<double> part(0.001, 0.999);
+  const Frame& f = g.info.frame;
+  const auto& n = f.numbers();
+  const Point along_i{n[1] / f.step_i(), n[4] / f.step_i()}, along_j{n[2] / f.step_j(), n[5] / f.step_j()};
+  for (const double i : {r.i0, r.i1})
+    out.push_back({f.to_domain(i, r.j0 + part(random) * (r.j1 - r.j0)), along_i});
+  for (const double j : {r.j0, r.j1})
+    out.push_back({f.to_domain(r.i0 + part(random) * (r.i1 - r.i0), j), along_j});
+}
+
+bool is_hole(int i, int j) { return i > 30 && i < 50 && j > 20 && j < 33; }
+
+class ContinuityCk : public ::testing::TestWithParam<BlendOptions> {
+ protected:
+  static void SetUpTestSuite() {
+    std::vector<GridFile> grids = surveys();
+    for (std::size_t k = 1; k < grids.size(); ++k)  // so that every seam is a step of metres
+      grids[k].at = [at = grids[k].at, k](int i, int j) {
+        return k == 1 && is_hole(i, j) ? kHole : at(i, j) + 3.0 * double(k);
+      };
+    scene_ = std::make_unique<Scene>(grids);
+  }
+  static void TearDownTestSuite() { scene_.reset(); }
+  static const Database& db() { return scene_->db(); }
+
+  // Kernel rims and domain rims of all patches of a cut: LOD changes and grid borders are among them.
+  static std::vector<Crossing> rims(double error) {
+    std::mt19937_64 random(test_seed(1));
+    std::vector<Crossing> all;
+    for (const PatchId id : extract(db(), {.error = error}).patches) {
+      const Grid& g = db().grid(id.grid());
+      const GridShape& shape = g.info.shape;
+      for (int n = 0; n < 4; ++n) {
+        add_edges(g, shape.kernel(id.level(), id.bx(), id.by()), random, all);
+        add_edges(g, shape.domain(id.level(), id.bx(), id.by()), random, all);
+      }
+    }
+    return all;
+  }
+  static std::vector<Crossing> cells_around_the_hole() {
+    std::mt19937_64 random(test_seed(2));
+    std::vector<Crossing> all;
+    const Grid& g = db().grids()[1];
+    for (double j = 10; j < 44; ++j)
+      for (double i = 20; i < 60; ++i) add_edges(g, {i, j, i + 1, j + 1}, random, all);
+    return all;
+  }
+  // The jumps of all errors' crossings together.
+  static double largest_jump(const std::vector<double>& errors, const std::vector<std::vector<Crossing>>& at,
+                             int j, double h) {
+    double most = 0;
+    for (std::size_t k = 0; k < errors.size(); ++k)
+      most = std::max(most, largest(jumps(db(), errors[k], GetParam(), at[k], j, h)));
+    return most;
+  }
+  static void expect_continuous(const std::vector<double>& errors,
+                                const std::vector<std::vector<Crossing>>& at) {
+    constexpr double h = 0.02;  // metres, 1/125 of the smallest cell
+    const int k = GetParam().smoothness;
+    for (int j = 0; j <= k; ++j)
+      for (std::size_t n = 0; n < errors.size(); ++n) {
+        const double wide = largest(jumps(db(), errors[n], GetParam(), at[n], j, h));
+        const double narrow = largest(jumps(db(), errors[n], GetParam(), at[n], j, h / 4));
+        EXPECT_LT(narrow, kFalls * wide) << "derivative " << j << " at error " << errors[n];
+        EXPECT_GT(wide, 0);
+      }
+    // Wendland's function of k = 1 is that of k = 2: smoother than asked for.
+    const int next = GetParam().composition == Composition::weighted && k == 1 ? 3 : k + 1;
+    EXPECT_GT(largest_jump(errors, at, next, h / 16), kFalls * largest_jump(errors, at, next, h / 4))
+        << "negative control: derivative " << next << " jumps";
+  }
+  static std::unique_ptr<Scene> scene_;
+};
+std::unique_ptr<Scene> ContinuityCk::scene_;
+
+TEST_P(ContinuityCk, AcrossKernelRimsDomainRimsAndLevels) {
+  const std::vector<double> errors{0, 1.5, 3, 6, 15};
+  std::vector<std::vector<Crossing>> at;
+  for (const double error : errors) at.push_back(rims(error));
+  expect_continuous(errors, at);
+}
+
+TEST_P(ContinuityCk, AcrossTheCellsAroundAHole) {
+  const std::vector<Crossing> cells = cells_around_the_hole();
+  expect_continuous({0, 12, 25}, {cells, cells, cells});
+}
+
+INSTANTIATE_TEST_SUITE_P(Blends, ContinuityCk, ::testing::ValuesIn(all_blends()), [](const auto& p) {
+  std::string name = name_of(p.param);
+  for (char& c : name)
+    if (c == ' ' || c == '=') c = '_';
+  return name;
+});
+
+}  // namespace
+}  // namespace patchwork

@@ -1,0 +1,279 @@
+// SourceExact, PartitionOfUnity, RimWeights, FarOrigin, RatioOfScales, SplineStencil (hard cases): what the
+// blend must give back without any error of its own.
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+#include "blend/kernels.h"
+#include "tests/blend/scene.h"
+
+namespace patchwork {
+namespace {
+
+// Rotated by the angles of Pythagorean triples (3 4 5, 5 12 13, 20 21 29): positions of vertices are exact.
+std::vector<GridFile> exact_frames() {
+  return {{.width = 80, .height = 60, .geotransform = {0, 20, 0, 1200, 0, -20}},
+          {.width = 90, .height = 70, .geotransform = {300, 4, 3, 500, 3, -4}},
+          {.width = 40, .height = 60, .geotransform = {600, -5, 12, 300, 12, 5}, .pixel_is_area = false},
+          {.width = 70, .height = 50, .geotransform = {700, 10, 10.5, 900, 10.5, -10}}};
+}
+
+// All patches of all grids in the order in which they speak, redundant ones too.
+std::vector<PatchId> every_patch(const Database& db) {
+  struct Entry {
+    double bottom;
+    const Grid* grid;
+    std::size_t index;
+  };
+  std::vector<Entry> all;
+  each_patch(db, [&](const Grid& g, std::size_t k, const GridShape::Block&) {
+    all.push_back({g.patches[k].bottom, &g, k});
+  });
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Entry& a, const Entry& b) { return a.bottom < b.bottom; });
+  std::vector<PatchId> ids;
+  for (const Entry& e : all) ids.push_back(e.grid->patch_id(e.index));
+  return ids;
+}
+
+TEST(SourceExact, AVertexOfTheMostAccurateGridInsideItsKernelGivesTheStoredValue) {
+  std::mt19937_64 random(test_seed(1));
+  std::uniform_int_distribution<int> sixty_fourths(-100000, 100000);
+  std::vector<double> noise(80 * 80);
+  for (double& v : noise) v = sixty_fourths(random) / 64.0;
+  GridFile fine{.width = 80, .height = 80, .geotransform = {200, 4, 0, 700, 0, -4}, .accuracy = 0.5};
+  fine.at = [&](int i, int j) { return noise[size_t(j * 80 + i)]; };
+  GridFile base = exact_frames()[0];
+  base.accuracy = 5, base.at = [](int, int) { return 3.0; };
+  const Scene scene({base, fine});
+  const Grid& g = scene.db().grids()[1];
+  Points points;
+  std::vector<double> stored;
+  const LatticeRect core = g.info.shape.core();
+  for (int j = int(std::ceil(core.j0)); j <= core.j1; ++j)
+    for (int i = int(std::ceil(core.i0)); i <= core.i1; ++i)
+      points.add(g.info.frame.to_domain(i, j)), stored.push_back(fine.at(i, j));
+  ASSERT_GT(points.size(), 3000u);
+  for (int k = 0; k <= 2; ++k) {
+    EXPECT_EQ(evaluate(scene.db(), 0, points, {.smoothness = k}).height, stored);
+    const BlendOptions weighted{.smoothness = k, .composition = Composition::weighted};
+    EXPECT_NE(evaluate(scene.db(), 0, points, weighted).height, stored) << "negative control: a mean";
+  }
+}
+
+TEST(PartitionOfUnity, ConstantTerrainIsReproducedToTheLastBit) {
+  constexpr double height = 1234.5;
+  std::vector<GridFile> grids = surveys();
+  for (GridFile& g : grids) g.at = [](int, int) { return height; }, g.accuracy = 0.1;
+  const Scene scene(grids);
+  std::mt19937_64 random(test_seed(2));
+  const Points points = random_points(scene.db().extent(), 10000, random);
+  const std::vector<PatchId> all = every_patch(scene.db());
+  for (const BlendOptions& options : all_blends()) {
+    const Answers a = evaluate(scene.db(), all, points, options);
+    std::size_t answered = 0;
+    for (std::size_t k = 0; k < points.size(); ++k)
+      if (a.source[k] != 0) {
+        ++answered;
+        ASSERT_EQ(a.height[k], height) << name_of(options);
+      }
+    EXPECT_GT(answered, points.size() / 2);
+  }
+}
+
+TEST(PartitionOfUnity, ThePlainSumOfTheWeightsIsNotOne) {
+  const GridShape shape(80, 60, true);
+  const LatticeRect kernel = shape.kernel(0, 0, 0), domain = shape.domain(0, 0, 0);
+  const double u[] = {0.5, 5, 20}, v[] = {20, 20, 20};
+  double ramp[3], wendland[3];
+  for (int k = 0; k <= 2; ++k) {
+    kernels::ramp_weights(k, kernel, domain, domain, u, v, 3, ramp);
+    kernels::wendland_weights(k, domain, u, v, 3, wendland);
+    EXPECT_TRUE(ramp[0] < 1 && ramp[1] < 1 && ramp[2] == 1);
+    EXPECT_TRUE(wendland[0] < 0.9 && wendland[1] < 0.9 && wendland[0] > 0);
+  }
+}
+
+TEST(PartitionOfUnity, ASharedPlaneIsReproduced) {
+  const auto plane = [](double x, double y) { return 100 + 0.25 * x - 0.125 * y; };
+  std::vector<GridFile> grids = exact_frames();
+  for (GridFile& g : grids) g = of_terrain(g, plane), g.accuracy = 0.5;
+  const Scene scene(grids);
+  std::mt19937_64 random(test_seed(3));
+  const Points points = random_points(scene.db().extent(), 20000, random);
+  const std::vector<PatchId> all = every_patch(scene.db());
+  for (const BlendOptions& options : all_blends()) {
+    const Answers a = evaluate(scene.db(), all, points, options);
+    for (std::size_t k = 0; k < points.size(); ++k)
+      if (a.source[k] != 0) {
+        ASSERT_NEAR(a.height[k], plane(points.x[k], points.y[k]), 1e-12 * 500) << name_of(options);
+      }
+  }
+}
+
+class RimWeights : public ::testing::TestWithParam<bool> {};  // pixel is area
+
+// Two grids side by side whose footprints share only the feathers.
+TEST_P(RimWeights, PointsJustInsideTheRimOfAllDataAnswerWithWhatTheGridsSay) {
+  const bool area = GetParam();
+  GridFile west{.width = 40, .height = 40, .geotransform = {0, 10, 0, 400, 0, -10}, .pixel_is_area = area};
+  GridFile east = west;
+  east.geotransform[0] = 360;
+  west.at = [](int, int) { return 10.0; }, east.at = [](int, int) { return 20.0; };
+  const Scene scene({west, east});
+  const Extent e = scene.db().extent();
+  const double rim = area ? 0 : 5;
+  ASSERT_NEAR(e.xmin, rim, 1e-6);
+  Points points;
+  const double up = std::numeric_limits<double>::infinity(), first = rim, last = 400 - rim;
+  for (const double inside : {0.0, 1e-14, 1e-11, 1e-8, 1e-5}) {
+    const double low = inside == 0 ? std::nextafter(first, up) : first + inside;
+    const double high = inside == 0 ? std::nextafter(last, 0) : last - inside;
+    for (const double t : {low, 17.3, 200.0, 383.1, high}) {
+      points.add(low, t), points.add(t, low), points.add(t, high), points.add(360 + high, t);
+      points.add(360 + low, t), points.add(high, t), points.add(360 + t, low), points.add(360 + t, high);
+    }
+  }
+  points.add(first, first), points.add(first, last), points.add(360 + last, first), points.add(first, 200);
+  for (const double error : {0.0, 100.0})
+    for (const BlendOptions& options : all_blends()) {
+      const Answers a = evaluate(scene.db(), error, points, options);
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        ASSERT_TRUE(std::isfinite(a.height[k]) && std::isfinite(a.bound[k]))
+            << name_of(options) << " at " << std::hexfloat << points.x[k] << " " << points.y[k];
+        const bool in_west = points.x[k] <= last, in_east = points.x[k] >= 360 + first;
+        ASSERT_GE(a.height[k], in_west ? 10 : 20);
+        ASSERT_LE(a.height[k], in_east ? 20 : 10);
+        ASSERT_GT(a.source[k], 0);
+      }
+    }
+}
+
+TEST_P(RimWeights, PointsJustOutsideHaveNoData) {
+  GridFile one{
+      .width = 40, .height = 40, .geotransform = {0, 10, 0, 400, 0, -10}, .pixel_is_area = GetParam()};
+  const Scene scene({one});
+  const double first = GetParam() ? 0 : 5, last = 400 - first;
+  Points points;
+  points.add(std::nextafter(last, 1e9), 200), points.add(200, std::nextafter(last, 1e9));
+  points.add(first - 1e-12, 200), points.add(200, first - 1e-12);
+  for (const BlendOptions& options : all_blends())
+    for (const std::int32_t source : evaluate(scene.db(), 0, points, options).source) EXPECT_EQ(source, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Registration, RimWeights, ::testing::Bool(),
+                         [](const auto& p) { return std::string(p.param ? "Area" : "Point"); });
+
+TEST(FarOrigin, TheSameGridsTenThousandKilometresAwayGiveTheSameHeights) {
+  // Metres: 1e-6 of a cell of the base (20 m) on slopes of 1 at most.
+  constexpr double kTolerance = 2e-5;
+  std::mt19937_64 random(test_seed(4));
+  for (const Point offset : {Point{500000, 5000000}, Point{1e7, -1e7}}) {
+    const std::vector<GridFile> near = surveys();
+    std::vector<GridFile> far = near;
+    for (GridFile& g : far) g.geotransform[0] += offset.x, g.geotransform[3] += offset.y;
+    const Scene here(near), there(far);
+    Points a = random_points(here.db().extent(), 5000, random), b;
+    for (std::size_t k = 0; k < a.size(); ++k) {
+      a.x[k] = std::round(a.x[k] * 64) / 64, a.y[k] = std::round(a.y[k] * 64) / 64;
+      b.add(a.x[k] + offset.x, a.y[k] + offset.y);
+    }
+    for (const double error : {0.0, 3.0})
+      for (const BlendOptions& options : all_blends()) {
+        const Answers p = evaluate(here.db(), error, a, options), q = evaluate(there.db(), error, b, options);
+        for (std::size_t k = 0; k < a.size(); ++k) {
+          ASSERT_EQ(p.source[k] == 0, q.source[k] == 0);
+          if (p.source[k] == 0) continue;
+          ASSERT_NEAR(p.height[k], q.height[k], kTolerance) << name_of(options);
+          ASSERT_NEAR(p.bound[k], q.bound[k], kTolerance) << name_of(options);
+        }
+      }
+    EXPECT_GT(std::abs(double(float(b.x[0])) - b.x[0]) + std::abs(double(float(b.y[0])) - b.y[0]), 1e-3)
+        << "negative control: float32 coordinates would not do";
+  }
+}
+
+TEST(RatioOfScales, ACentimetreGridOnAKilometreGridIsImportedAndReadInBoundedTime) {
+  const auto start = std::chrono::steady_clock::now();
+  GridFile globe{.width = 60, .height = 60, .geotransform = {0, 1000, 0, 60000, 0, -1000}, .accuracy = 50};
+  globe.at = [](int i, int j) { return 1000.0 + 8 * ((3 * i + 5 * j) % 7); };
+  GridFile drone{.width = 300, .height = 300, .geotransform = rotated(30210, 30570, 31, 0.01, 0.01)};
+  drone.accuracy = 0.02, drone.at = [](int i, int j) { return 1020 + 0.125 * ((i / 8 + j / 8) % 2); };
+  const Scene scene({globe, drone});
+  const Frame& frame = scene.db().grids()[1].info.frame;
+  Points inside, outside;
+  std::vector<double> stored;
+  for (int j = 12; j < 288; j += 3)
+    for (int i = 12; i < 288; i += 3) inside.add(frame.to_domain(i, j)), stored.push_back(drone.at(i, j));
+  for (int k = 0; k < 1000; ++k) outside.add(500 + 59.0 * k, 500 + 57.0 * k);
+  for (const BlendOptions& options : all_blends()) {
+    const Answers fine = evaluate(scene.db(), 0, inside, options);
+    const Answers coarse = evaluate(scene.db(), 0, outside, options);
+    for (std::size_t k = 0; k < inside.size(); ++k) {
+      if (options.composition == Composition::priority) {
+        ASSERT_NEAR(fine.height[k], stored[k], 1e-6);
+      }
+      ASSERT_LE(std::abs(fine.height[k] - stored[k]), fine.bound[k]);
+    }
+    for (const std::int32_t source : coarse.source) ASSERT_EQ(source, 1);
+  }
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  EXPECT_LT(seconds.count(), 20) << "recursion per cell would take minutes";
+}
+
+class SplineStencil : public ::testing::Test {
+ protected:
+  static GridFile spikes() {
+    GridFile g{.width = 131, .height = 100, .geotransform = {0, 8, 0, 800, 0, -8}};
+    g.at = [](int i, int j) { return (i * 37 + j * 101) % 23 == 0 ? 5000.0 : double((i * 5 + j * 3) % 11); };
+    return g;
+  }
+};
+
+TEST_F(SplineStencil, NeighbouringPatchesOfALevelAgreeInTheirOverlap) {
+  const Scene scene({spikes()});
+  const Grid& g = scene.db().grids()[0];
+  std::size_t overlaps = 0;
+  for (int level = 0; level < g.info.shape.levels(); ++level)
+    for (int by = 0; by < g.info.shape.blocks_j(level); ++by)
+      for (int bx = 0; bx + 1 < g.info.shape.blocks_i(level); ++bx) {
+        const LatticeRect a = g.info.shape.domain(level, bx, by), b = g.info.shape.domain(level, bx + 1, by);
+        Points points;
+        for (int j = 0; j <= 64; ++j)  // coordinates in dyadic parts of a cell: no rounding on the way
+          for (int i = 0; i <= 64; ++i)
+            points.add(g.info.frame.to_domain(b.i0 + (a.i1 - b.i0) * i / 64, a.j0 + (a.j1 - a.j0) * j / 64));
+        for (int k = 0; k <= 2; ++k) {
+          const BlendOptions options{.smoothness = k};
+          const PatchId left = g.patch_id(g.info.shape.index(level, bx, by));
+          const PatchId right = g.patch_id(g.info.shape.index(level, bx + 1, by));
+          const Answers p = evaluate(scene.db(), std::span(&left, 1), points, options);
+          const Answers q = evaluate(scene.db(), std::span(&right, 1), points, options);
+          ASSERT_EQ(p.height, q.height) << "level " << level << " k=" << k;
+        }
+        ++overlaps;
+      }
+  EXPECT_GT(overlaps, 10u);
+}
+
+TEST_F(SplineStencil, SpikesStayWithinTheBoundAndFinite) {
+  const GridFile file = spikes();
+  const Scene scene({file});
+  const Grid& g = scene.db().grids()[0];
+  std::mt19937_64 random(test_seed(5));
+  const Points points = random_points(scene.db().extent(), 20000, random);
+  for (const BlendOptions& options : all_blends()) {
+    const Answers a = evaluate(scene.db(), 0, points, options);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      ASSERT_TRUE(std::isfinite(a.height[k]));
+      const Point q = g.info.frame.to_lattice(points.x[k], points.y[k]);
+      const int i = std::clamp(int(q.x), 0, file.width - 2), j = std::clamp(int(q.y), 0, file.height - 2);
+      const double s = q.x - i, t = q.y - j;
+      const double h = (1 - t) * ((1 - s) * file.at(i, j) + s * file.at(i + 1, j)) +
+                       t * ((1 - s) * file.at(i, j + 1) + s * file.at(i + 1, j + 1));
+      ASSERT_LE(std::abs(a.height[k] - h), a.bound[k]) << name_of(options);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace patchwork

@@ -1,0 +1,366 @@
+// A database as one thing: the same for every order of insertion, what it was after a failure, and refused
+// where it is damaged.
+#include "db/database.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <numeric>
+#include <random>
+
+#include "tests/db/databases.h"
+#include "tests/grids.h"
+#include "tests/seed.h"
+
+namespace patchwork {
+namespace {
+
+double rough(double x, double y) {
+  return 40 * std::sin(x / 170) * std::cos(y / 130) + 5 * std::sin(x / 21 + y / 37) + std::sin(x * 1.7 + y);
+}
+
+std::string contents(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// Statements that no Patchwork would execute.
+void execute(const std::string& path, const std::string& sql) {
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &db), SQLITE_OK);
+  char* message = nullptr;
+  EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
+  sqlite3_close(db);
+}
+
+bool says(const std::string& text, const std::string& part) {
+  EXPECT_NE(text.find(part), std::string::npos) << text;
+  return true;
+}
+
+// --- OrderPermutations.
+
+// Overlapping surveys, rotated, some with holes, two of equal frame and one constant.
+std::vector<GridFile> overlapping(int n, int side, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  std::vector<GridFile> files;
+  for (int k = 0; k < n; ++k) {
+    GridFile file{.width = side + int(random() % 12), .height = side + int(random() % 12)};
+    const double step = uniform(5, 9);
+    file.geotransform = k == 1 ? files[0].geotransform
+                               : rotated(uniform(-90, 90), uniform(-90, 90), uniform(-180, 180), step, step);
+    if (k == 1) file.width = files[0].width, file.height = files[0].height;
+    file.accuracy = k < 2 ? 1 : uniform(0.2, 3);
+    const double lift = k;
+    file = of_terrain(file, [lift](double x, double y) { return rough(x, y) + lift; });
+    if (k % 3 == 2)
+      file.at = [at = file.at, side](int i, int j) {
+        return i > side / 2 && j > side / 2 ? kHole : at(i, j);
+      };
+    if (k == 3) file.at = [](int, int) { return 7.0; };
+    files.push_back(file);
+  }
+  return files;
+}
+
+class Orders {
+ public:
+  explicit Orders(const std::vector<GridFile>& files) {
+    for (std::size_t k = 0; k < files.size(); ++k)
+      sources_.push_back(folder_.source(files[k], fmt::format("g{}", k)));
+  }
+  std::string hash(const std::vector<std::size_t>& order) {
+    const std::string name = fmt::format("d{}", count_++);
+    Database db = folder_.database(name);
+    for (const std::size_t k : order) db.import(sources_[k], {.name = fmt::format("g{}", k)});
+    EXPECT_EQ(db.tree().size(), count_live(db));
+    return db.content_hash();
+  }
+  std::string replaced(const GridFile& other, std::size_t k) {
+    sources_[k] = folder_.source(other, "other");
+    std::vector<std::size_t> order(sources_.size());
+    std::iota(order.begin(), order.end(), 0);
+    return hash(order);
+  }
+
+ private:
+  GridFolder folder_;
+  std::vector<RasterSource> sources_;
+  int count_ = 0;
+};
+
+// All 720 orders of six grids, a test for each grid that may come first.
+class OrderPermutations : public testing::TestWithParam<int> {};
+
+TEST_P(OrderPermutations, OfSixOverlappingGridsGiveOneHash) {
+  const std::vector<GridFile> files = overlapping(6, 20, test_seed(1));
+  Orders orders(files);
+  std::vector<std::size_t> order(files.size());
+  std::iota(order.begin(), order.end(), 0);
+  const std::string expected = orders.hash(order);
+  std::rotate(order.begin(), order.begin() + GetParam(), order.begin() + GetParam() + 1);
+  int tried = 0;
+  do {
+    ASSERT_EQ(orders.hash(order), expected) << testing::PrintToString(order);
+    ++tried;
+  } while (std::next_permutation(order.begin() + 1, order.end()));
+  EXPECT_EQ(tried, 120);
+  GridFile other = files[2];
+  other.at = [at = other.at](int i, int j) { return at(i, j) + (i == 3 && j == 4); };
+  EXPECT_NE(orders.replaced(other, 2), expected) << "negative control: one other sample";
+}
+
+INSTANTIATE_TEST_SUITE_P(First, OrderPermutations, testing::Range(0, 6));
+
+TEST(OrderPermutations, ShufflesOfTwelveLargerGridsGiveOneHash) {
+  const std::uint64_t seed = test_seed(2);
+  Orders orders(overlapping(12, 60, seed));
+  std::vector<std::size_t> order(12);
+  std::iota(order.begin(), order.end(), 0);
+  const std::string expected = orders.hash(order);
+  std::mt19937_64 random(seed);
+  for (int n = 0; n < 12; ++n) {
+    std::shuffle(order.begin(), order.end(), random);
+    ASSERT_EQ(orders.hash(order), expected) << testing::PrintToString(order);
+  }
+}
+
+// --- EqualGrids.
+
+TEST(EqualGrids, TheSameGridTwiceIsThereOnce) {
+  const GridFolder folder;
+  Database db = folder.database();
+  const GridFile file = of_terrain({.width = 60, .height = 50}, rough);
+  folder.add(db, file, "first");
+  const std::string hash = db.content_hash();
+  const ImportReport report = folder.add(db, file, "second");
+  EXPECT_EQ(report.duplicate_of, "first");
+  EXPECT_EQ(report.patches, 0u);
+  EXPECT_EQ(db.grids().size(), 1u);
+  EXPECT_EQ(db.content_hash(), hash);
+  EXPECT_EQ(Database::open(db.path()).content_hash(), hash);
+  EXPECT_EQ(
+      folder.add(db, of_terrain({.width = 60, .height = 50, .accuracy = 0.2}, rough), "third").duplicate_of,
+      "")
+      << "negative control: another accuracy is another grid";
+}
+
+TEST(EqualGrids, EqualFramesWithOtherHeightsHaveOneWinnerWhateverTheOrder) {
+  const GridFile low{.width = 60, .height = 50, .at = [](int, int) { return 10.0; }};
+  const GridFile high{.width = 60, .height = 50, .at = [](int, int) { return 20.0; }};
+  std::vector<std::string> winners, hashes;
+  for (const bool swapped : {false, true}) {
+    const GridFolder folder;
+    Database db = folder.database();
+    folder.add(db, swapped ? high : low, swapped ? "high" : "low");
+    folder.add(db, swapped ? low : high, swapped ? "low" : "high");
+    std::string live;
+    for (const Grid& g : db.grids())
+      each_patch(g, [&](std::size_t k, auto) { live += g.patches[k].dormant() ? "" : g.info.name; });
+    winners.push_back(live), hashes.push_back(db.content_hash());
+  }
+  EXPECT_TRUE(winners[0] == "low" || winners[0] == "high") << winners[0];
+  EXPECT_EQ(winners[0], winners[1]);
+  EXPECT_EQ(hashes[0], hashes[1]);
+}
+
+TEST(EqualGrids, ANameIsGivenOnce) {
+  const GridFolder folder;
+  Database db = folder.database();
+  folder.add(db, heights("1 2 / 3 4"), "name");
+  EXPECT_TRUE(
+      says(refusal_of([&] { folder.add(db, heights("1 2 / 3 5"), "name"); }), "has a grid named name"));
+}
+
+// --- What is stored.
+
+Database two_grids(const GridFolder& folder) {
+  Database db = folder.database();
+  folder.add(db, of_terrain({.width = 150, .height = 130, .accuracy = 1}, rough), "coarse");
+  GridFile fine =
+      of_terrain({.width = 90, .height = 80, .geotransform = rotated(300, -300, 30, 4, 4)}, rough);
+  fine.at = [at = fine.at](int i, int j) { return i > 30 && i < 50 && j > 60 ? kHole : at(i, j); };
+  folder.add(db, fine, "fine");
+  return db;
+}
+
+TEST(Database, ReopenedItIsWhatItWas) {
+  const GridFolder folder;
+  const Database written = two_grids(folder);
+  const Database read = Database::open(written.path());
+  EXPECT_EQ(read.content_hash(), written.content_hash());
+  EXPECT_EQ(read.crs(), written.crs());
+  EXPECT_EQ(read.sample_bytes(), written.sample_bytes());
+  EXPECT_EQ(read.coverage_counts().integer, written.coverage_counts().integer);
+  ASSERT_EQ(read.grids().size(), written.grids().size());
+  for (std::size_t g = 0; g < read.grids().size(); ++g) {
+    const Grid &a = read.grids()[g], &b = written.grids()[g];
+    EXPECT_EQ(a.info.name, b.info.name);
+    EXPECT_EQ(a.info.frame.numbers(), b.info.frame.numbers());
+    EXPECT_EQ(a.info.rim_error, b.info.rim_error);
+    EXPECT_EQ(a.patches, b.patches);
+    EXPECT_EQ(a.offers, b.offers);
+    EXPECT_EQ(different_surfaces(read, a, written, b), 0);
+  }
+  EXPECT_EQ(read.tree().find_violation(), "");
+  EXPECT_EQ(read.tree().header_bytes(), written.tree().header_bytes());
+}
+
+TEST(Database, TheHashDoesNotDependOnNames) {
+  const GridFolder folder;
+  Database a = folder.database("a"), b = folder.database("b");
+  folder.add(a, heights("1 2 / 3 4"), "one");
+  folder.add(b, heights("1 2 / 3 4"), "two");
+  EXPECT_EQ(a.content_hash(), b.content_hash());
+}
+
+TEST(Database, AReaderKeepsItsStateWhileAnotherWrites) {
+  const GridFolder folder;
+  Database writer = two_grids(folder);
+  const Database reader = Database::open(writer.path());
+  const std::string before = writer.content_hash();
+  folder.add(writer, heights("1 2 / 3 4", {.accuracy = 0.01}), "later");
+  EXPECT_EQ(reader.content_hash(), before);
+  EXPECT_NO_THROW(reader.surface(reader.grids()[0].patch_id(0)));
+  EXPECT_NE(Database::open(writer.path()).content_hash(), before);
+}
+
+// Runs `act`, which must be refused, and expects the database to be as before, in memory and byte by byte.
+void expect_unharmed(const std::function<std::string(const GridFolder&, Database&)>& act) {
+  const GridFolder folder;
+  std::string path, hash;
+  {
+    const Database db = two_grids(folder);
+    path = db.path(), hash = db.content_hash();
+  }
+  const std::string bytes = contents(path);
+  {
+    Database db = folder.database();
+    EXPECT_EQ(act(folder, db), "");
+    EXPECT_EQ(db.content_hash(), hash);
+    EXPECT_EQ(db.tree().find_violation(), "");
+    EXPECT_EQ(db.tree().size(), count_live(db));
+    EXPECT_EQ(Database::open(path).content_hash(), hash);
+  }
+  EXPECT_EQ(contents(path) == bytes, true) << "the file changed";
+}
+
+TEST(Database, AFailedImportLeavesItAsItWas) {
+  const auto refused = [](const GridFile& file, const char* why) {
+    return [file, why](const GridFolder& folder, Database& db) {
+      const std::string what = refusal_of([&] { folder.add(db, file, "bad"); });
+      return what.find(why) == std::string::npos ? "not refused as expected: " + what : "";
+    };
+  };
+  GridFile nothing{.width = 60, .height = 50, .at = [](int, int) { return kHole; }};
+  expect_unharmed(refused(nothing, "every sample is nodata"));
+  GridFile board{.width = 300, .height = 250};
+  board.at = [](int i, int j) { return (i + j) % 2 ? kHole : 1.0; };
+  expect_unharmed(refused(board, "no cell with data at all four corners"));
+}
+
+TEST(Database, AnImportBrokenOffHalfwayLeavesItAsItWas) {
+  for (const double at : {0.0, 0.3, 0.85}) {
+    expect_unharmed([at](const GridFolder& folder, Database& db) {
+      struct Stop {};
+      ImportOptions options{.progress = [at](double share) {
+        if (share >= at) throw Stop{};
+      }};
+      try {
+        folder.add(db, of_terrain({.width = 200, .height = 200}, rough), "stopped", options);
+      } catch (const Stop&) {
+        return "";
+      }
+      return "it was not stopped";
+    });
+  }
+}
+
+TEST(Database, ADryRunReportsAndKeepsNothing) {
+  expect_unharmed([](const GridFolder& folder, Database& db) {
+    const GridFile file = of_terrain({.width = 200, .height = 200, .accuracy = 0.01}, rough);
+    const ImportReport dry = folder.add(db, file, "dry", {.dry_run = true});
+    EXPECT_GT(dry.patches, 0u);
+    EXPECT_EQ(db.grids().size(), 2u);
+    const GridFolder other;
+    Database copy = two_grids(other);
+    const ImportReport wet = folder.add(copy, file, "wet");
+    EXPECT_EQ(dry.patches, wet.patches);
+    EXPECT_EQ(dry.hidden, wet.hidden);
+    EXPECT_EQ(dry.lowered, wet.lowered);
+    return "";
+  });
+}
+
+// --- Files that are none, or damaged.
+
+TEST(Database, WhatIsNoDatabaseIsRefusedByName) {
+  const GridFolder folder;
+  const auto refused = [&](const std::string& name, const char* why) {
+    const std::string path = folder.path(name);
+    for (const std::string& what : {refusal_of([&] { Database::open(path); }),
+                                    refusal_of([&] { Database::open_or_create(path, ""); })}) {
+      EXPECT_TRUE(says(what, path));
+      EXPECT_TRUE(says(what, why));
+    }
+  };
+  EXPECT_TRUE(says(refusal_of([&] { Database::open(folder.path("absent")); }), "there is no such database"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path("absent")));
+  std::ofstream(folder.path("text")) << std::string(5000, 'x');
+  refused("text", "it is not a database");
+  execute(folder.path("foreign"), "CREATE TABLE t(x); PRAGMA application_id = 5");
+  refused("foreign", "another program");
+  execute(folder.path("anonymous"), "CREATE TABLE t(x)");
+  refused("anonymous", "another program");
+  folder.database("newer");
+  execute(folder.path("newer"), "PRAGMA user_version = 99");
+  refused("newer", "newer Patchwork (schema 99)");
+  std::filesystem::create_directory(folder.path("folder"));
+  refused("folder", "it is a folder");
+  EXPECT_TRUE(
+      says(refusal_of([&] { Database::open_or_create(folder.path("no/such/folder/db"), ""); }), "no/such"));
+}
+
+// The database with `sql` done to it; what opening it and reading every patch is refused with.
+std::string damaged(const std::string& sql) {
+  const GridFolder folder;
+  std::string path;
+  { path = two_grids(folder).path(); }
+  execute(path, sql);
+  const std::string what = refusal_of([&] {
+    const Database db = Database::open(path);
+    for (const Grid& g : db.grids()) each_patch(g, [&](std::size_t k, auto) { db.surface(g.patch_id(k)); });
+  });
+  if (!what.empty()) {
+    EXPECT_EQ(what.find(path), 0u) << what << " does not begin with the file's name";
+  }
+  return what;
+}
+
+TEST(Database, DamageIsReportedWithTheNameOfTheFile) {
+  EXPECT_EQ(damaged("SELECT 1"), "") << "negative control: the sound database is read";
+  // The last byte replaced by another one.
+  const auto tail = [&](const char* table, const char* column) {
+    return fmt::format(
+        "UPDATE {0} SET {1} = CAST(substr({1}, 1, length({1}) - 1) || "
+        "CASE WHEN substr({1}, -1) = x'5A' THEN x'5B' ELSE x'5A' END AS BLOB)",
+        table, column);
+  };
+  EXPECT_TRUE(says(damaged(tail("payload", "data")), "a payload chunk is damaged"));
+  EXPECT_TRUE(says(damaged(tail("patches", "data")), "a run of patch records is damaged"));
+  EXPECT_TRUE(says(damaged(tail("tree_page", "data")), "a page of the R-tree is damaged"));
+  EXPECT_TRUE(says(damaged(tail("grid", "facts")), "the record of a grid is damaged"));
+  EXPECT_TRUE(says(damaged("DELETE FROM payload WHERE rowid = (SELECT max(id) FROM payload)"), "missing"));
+  EXPECT_TRUE(says(damaged("DELETE FROM patches WHERE run = 0"), "missing"));
+  EXPECT_NE(damaged("DROP TABLE payload"), "");
+}
+
+}  // namespace
+}  // namespace patchwork

@@ -1,0 +1,57 @@
+// What the benchmarks of `patchwork bench` share: works with their peers, spreads, a folder, test terrains.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tools/cli.h"
+
+namespace patchwork::cli {
+
+struct BenchOptions {
+  int size = 4097;   ///< samples, and pixels + 1, along each side
+  int runs = 5;      ///< measured; one more of each side comes before to warm up
+  int threads = 2;   ///< given to both sides
+  std::string keep;  ///< folder to work in and to leave; empty: a temporary one
+};
+
+struct Spread {
+  double min = 0, median = 0, max = 0;
+  static Spread of(std::vector<double> values);  ///< REQUIRES: not empty
+};
+
+/// One figure of ours beside the peers' figures of the same run.
+struct Work {
+  std::string work, unit;
+  bool lower_is_better = true;
+  Spread ours;
+  std::vector<std::pair<std::string, Spread>> peers;
+  Json answer;  ///< what was computed
+};
+
+/// Each measures ours and the peers in turns, A B A B. Throws Error where a peer's program is missing.
+std::vector<Work> bench_import(const BenchOptions& options);
+std::vector<Work> bench_resample(const BenchOptions& options);
+
+/// The folder of a benchmark's files: removed with all in it, unless the options say where to keep it.
+class WorkFolder {
+ public:
+  explicit WorkFolder(const BenchOptions& options);
+  ~WorkFolder();
+  WorkFolder(const WorkFolder&) = delete;
+  WorkFolder& operator=(const WorkFolder&) = delete;
+  std::string path(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+  bool keep_;
+};
+
+/// A program of ours: it lies beside this executable.
+std::string own_program(const std::string& name);
+/// Runs make_terrain into `folder` and returns what it says of its files (terrain.json).
+Json make_terrain(const std::string& folder, const std::vector<std::string>& arguments);
+
+}  // namespace patchwork::cli

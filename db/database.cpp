@@ -10,13 +10,15 @@
 
 #include "db/database_impl.h"
 #include "db/error.h"
+#include "db/surface_pool.h"
 
 namespace patchwork {
 
 namespace {
 
-// Shares of the memory setting: decoded chunks, patches ready to evaluate.
-constexpr std::size_t kChunkShare = 4, kSurfaceShare = 4;
+// Shares of the memory setting: patches ready to evaluate, and the decoded chunks that they are cut from,
+// which are of no use afterwards.
+constexpr std::size_t kChunkShare = 32, kSurfaceShare = 4;
 
 float round_down(double v) {
   const float f = float(v);
@@ -215,7 +217,8 @@ std::shared_ptr<const PatchSurface> Database::surface(PatchId id) const {
     const Grid& g = grid(id.grid());
     const int level = id.level(), first_i = id.bx() * kKernelCells - kExtensionCells - 1,
               first_j = id.by() * kKernelCells - kExtensionCells - 1;
-    auto s = std::make_shared<PatchSurface>();
+    auto s =
+        std::allocate_shared<PatchSurface>(std::pmr::polymorphic_allocator<PatchSurface>(&surface_pool()));
     s->id = id, s->level = level, s->first_i = first_i, s->first_j = first_j;
     s->kernel = g.info.shape.kernel(level, id.bx(), id.by());
     s->domain = g.info.shape.domain(level, id.bx(), id.by());

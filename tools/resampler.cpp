@@ -23,7 +23,7 @@ Raster Raster::covering(const Extent& e, double step) {
 
 RasterFrame Raster::frame(int factor) const {
   const double s = step * factor;
-  return {xmin + 0.5 * s, s, 0, ymax - 0.5 * s, 0, -s};
+  return {xmin + 0.5 * step, s, 0, ymax - 0.5 * step, 0, -s};
 }
 
 double finest_step(const Database& db, const Extent& extent) {
@@ -36,11 +36,36 @@ double finest_step(const Database& db, const Extent& extent) {
   return finest;
 }
 
-Resampler::Resampler(const Blend& blend, const Raster& raster, std::vector<std::string> bands)
-    : blend_(blend), raster_(raster), bands_(std::move(bands)) {}
+Resampler::Resampler(const Blend& blend, const Raster& raster, std::vector<std::string> bands,
+                     std::size_t memory)
+    : blend_(blend), raster_(raster), bands_(std::move(bands)) {
+  const std::size_t pixels = size_t(raster.width) * size_t(raster.height);
+  if (pixels > memory / 4 / (sizeof(float) * bands_.size())) return;
+  for (std::size_t b = 0; b < bands_.size(); ++b) whole_.emplace_back(pixels);
+}
 
 void Resampler::rows(int factor, int row, int rows, std::span<float* const> bands) {
   const auto start = std::chrono::steady_clock::now();
+  if (whole_.empty()) {
+    evaluate(factor, row, rows, bands);
+  } else {
+    std::vector<float*> planes;
+    for (Buffer<float>& plane : whole_) planes.push_back(plane.data());
+    if (!done_) evaluate(1, 0, raster_.height, planes);
+    done_ = true;
+    const int width = (raster_.width + factor - 1) / factor;
+    tbb::parallel_for(0, rows, [&](int r) {
+      for (std::size_t b = 0; b < bands.size(); ++b) {
+        const float* from = planes[b] + size_t(row + r) * size_t(factor) * size_t(raster_.width);
+        float* to = bands[b] + size_t(r) * size_t(width);
+        for (int c = 0; c < width; ++c) to[c] = from[size_t(c) * size_t(factor)];
+      }
+    });
+  }
+  tally_.blend_seconds += seconds_since(start);
+}
+
+void Resampler::evaluate(int factor, int row, int rows, std::span<float* const> bands) {
   const int width = (raster_.width + factor - 1) / factor;
   const std::size_t n = size_t(width) * size_t(rows);
   BlendOutput out;
@@ -51,11 +76,11 @@ void Resampler::rows(int factor, int row, int rows, std::span<float* const> band
   }
   const BlendCounts c = blend_.at_pixels(raster_.frame(factor), width, row, rows, out);
   for (std::size_t b = 0; b < bands_.size(); ++b) {
-    if (bands_[b] == "height" && bands[b] == out.height32.data()) continue;
+    if (bands[b] == out.height32.data()) continue;
     tbb::parallel_for(0, rows, [&](int r) {
       const std::size_t from = size_t(r) * size_t(width), to = from + size_t(width);
       float* f = bands[b];
-      if (bands_[b] == "height")
+      if (bands_[b] == "height")  // asked for twice
         std::copy(out.height32.begin() + long(from), out.height32.begin() + long(to), f + from);
       if (bands_[b] == "source")
         std::copy(source_.begin() + long(from), source_.begin() + long(to), f + from);
@@ -67,18 +92,19 @@ void Resampler::rows(int factor, int row, int rows, std::span<float* const> band
         }
     });
   }
-  if (factor == 1) {
-    tally_.full.points += c.points, tally_.full.contributions += c.contributions;
-    tally_.full.most = std::max(tally_.full.most, c.most);
-    tally_.full.bound_max = std::max(tally_.full.bound_max, c.bound_max);
-  }
-  tally_.blend_seconds += seconds_since(start);
+  if (factor > 1) return;
+  tally_.full.points += c.points, tally_.full.contributions += c.contributions;
+  tally_.full.most = std::max(tally_.full.most, c.most);
+  tally_.full.bound_max = std::max(tally_.full.bound_max, c.bound_max);
 }
 
 double prefetch(const Database& db, std::span<const PatchId> patches, std::size_t memory) {
   const auto start = std::chrono::steady_clock::now();
   if (patches.size() * sizeof(PatchSurface) > memory / 8) return 0;
-  tbb::parallel_for(size_t(0), patches.size(), [&](std::size_t k) { db.surface(patches[k]); });
+  // By place, not by priority: neighbours are cut from the same chunks.
+  std::vector<PatchId> order(patches.begin(), patches.end());
+  std::sort(order.begin(), order.end());
+  tbb::parallel_for(size_t(0), order.size(), [&](std::size_t k) { db.surface(order[k]); });
   return seconds_since(start);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "blend/blend.h"
+#include "db/buffer.h"
 #include "query/extract.h"
 
 namespace patchwork::cli {
@@ -19,7 +20,8 @@ struct Raster {
   /// The pixels of `step` that cover `extent`. Throws Error: a step that is not above 0, more than 2^31
   /// pixels a side.
   static Raster covering(const Extent& extent, double step);
-  /// Pixel centres, each pixel standing for factor x factor of this raster's.
+  /// Pixel centres; those of an overview are every factor-th of this raster's, so that its heights keep their
+  /// bounds.
   RasterFrame frame(int factor = 1) const;
 };
 
@@ -34,15 +36,20 @@ struct ResampleTally {
 /// Fills rows of the bands named (height, bound, source) as float32, NaN (source: 0) where there is no data.
 class Resampler {
  public:
-  Resampler(const Blend& blend, const Raster& raster, std::vector<std::string> bands);
+  /// Evaluates all at once if the raster fits into a quarter of `memory` (bytes), else rows as they are asked
+  /// for.
+  Resampler(const Blend& blend, const Raster& raster, std::vector<std::string> bands, std::size_t memory);
   void rows(int factor, int row, int rows, std::span<float* const> bands);
   const ResampleTally& tally() const { return tally_; }
 
  private:
+  void evaluate(int factor, int row, int rows, std::span<float* const> bands);
   const Blend& blend_;
   Raster raster_;
   std::vector<std::string> bands_;
   ResampleTally tally_;
+  std::vector<Buffer<float>> whole_;  // the full resolution, a plane a band, where it fits
+  bool done_ = false;
   std::vector<double> bound_;
   std::vector<std::int32_t> source_;
 };

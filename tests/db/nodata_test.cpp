@@ -89,6 +89,7 @@ TEST(NodataEdges, EveryCellOfEveryLevelSaysWhatItsSamplesSay) {
 TEST(NodataEdges, ValidSamplesAreStoredAsTheyAreAndNoneLeaksIn) {
   for (const auto& [name, missing] : kCases)
     for (const double nodata : {-9999.0, -32768.0, 3e38}) {
+      SCOPED_TRACE(name);
       const GridFolder folder;
       GridFile file = with_holes(missing, 70, 65);
       file.nodata = nodata, file.accuracy = 0;
@@ -104,10 +105,10 @@ TEST(NodataEdges, ValidSamplesAreStoredAsTheyAreAndNoneLeaksIn) {
             const int i = (int(s->first_i) + u) * (1 << b.level), j = (int(s->first_j) + v) * (1 << b.level);
             if (i < 0 || j < 0 || i >= file.width || j >= file.height) continue;
             const double h = g.info.height(s->codes[size_t(v * PatchSurface::kSide + u)]);
-            if (b.level == 0 && !missing(i, j)) {
+            if (b.level == 0 && !std::isnan(file.at(i, j))) {
               EXPECT_NEAR(h, float(terrain(i, j)), g.info.quantisation) << i << ", " << j;
             }
-            EXPECT_LT(std::abs(h), 1000) << name << ": " << b.level << " at " << i << ", " << j;
+            EXPECT_LT(std::abs(h), 1000) << b.level << " at " << i << ", " << j;
           }
       });
     }

@@ -1,6 +1,7 @@
 // Opening and reading one file: what is refused, what is masked, what heights its numbers mean.
 #include "db/raster.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>

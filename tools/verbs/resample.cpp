@@ -129,7 +129,7 @@ void run(const Options& o, const Common& common) {
   const Extraction x = extract(db, {.error = o.surface.error, .region = Region::inside(extent)});
   const double fetch_seconds = prefetch(db, x.patches, common.memory);
   const Blend blend(db, x.patches, o.surface.blend_options());
-  Resampler resampler(blend, raster, o.bands);
+  Resampler resampler(blend, raster, o.bands, common.memory);
   const auto writing = std::chrono::steady_clock::now();
   {
     ProgressBar bar(common, "resample", double(raster.width) * raster.height / 1e6, "Mpx");

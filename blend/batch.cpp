@@ -69,7 +69,7 @@ Batch::Batch() {
   for (auto* a : {&left_at_, &reads_, &touched_}) a->resize(kPoints);
   for (auto* a : {&source, &patch}) a->resize(kPoints);
   for (Reached* r : {&whole_, &part_}) {
-    for (auto* a : {&r->u, &r->v, &r->weight, &r->value}) a->resize(kPoints);
+    for (auto* a : {&r->u, &r->v, &r->weight, &r->value, &r->floor}) a->resize(kPoints);
     r->at.resize(kPoints);
   }
 }
@@ -117,7 +117,8 @@ void Batch::take_all() {
     const std::uint32_t at = left_at_[k];
     part_.u[part] = whole_.u[k], part_.v[part] = whole_.v[k], part_.weight[part] = whole_.weight[k];
     part_.at[part] = at;
-    part += (whole_.weight[k] >= 0) & (rest_[at] > 0);
+    const bool reached = whole_.weight[k] >= 0, open = rest_[at] > 0;
+    part += reached & open;
   }
   whole_.n = 0, part_.n = part;
 }
@@ -132,6 +133,16 @@ void Batch::drop_settled() {
   left_ = left;
 }
 
+// Before holes take from the weights; ramps that end at the outer samples are taken up to the domain's rim.
+void Batch::keep_floors(const Blend::Placed& p, const BlendOptions& options) {
+  Reached& r = part_;
+  if (options.composition == Composition::priority && p.has_rim)
+    kernels::ramp_weights(options.smoothness, p.kernel, p.domain, p.domain, r.u.data(), r.v.data(), int(r.n),
+                          r.floor.data());
+  else
+    std::copy_n(r.weight.begin(), r.n, r.floor.begin());
+}
+
 void Batch::fade_at_holes(const PatchSurface::Holes& holes, int smoothness) {
   Reached& r = part_;
   std::size_t kept = 0;
@@ -139,6 +150,7 @@ void Batch::fade_at_holes(const PatchSurface::Holes& holes, int smoothness) {
     if (!any_cell(holes.answering, r.u[k], r.v[k])) continue;
     const double factor = hole_factor(holes, r.u[k], r.v[k], smoothness);
     r.u[kept] = r.u[k], r.v[kept] = r.v[k], r.weight[kept] = r.weight[k] * factor, r.at[kept] = r.at[k];
+    r.floor[kept] = r.floor[k];
     ++kept;
   }
   r.n = kept;
@@ -167,7 +179,8 @@ void Batch::add(const Blend::Placed& p, std::uint32_t place, const PatchSurface&
   const Reached& r = part_;
   for (std::size_t k = 0; k < r.n; ++k) {
     const std::uint32_t i = r.at[k];
-    const double w = (r.weight[k] + kWeightFloor) * (priority ? rest_[i] : p.volume), h = r.value[k];
+    const double own = r.weight[k] + (kWeightFloor * r.floor[k] + kRimFloor);
+    const double w = own * (priority ? rest_[i] : p.volume), h = r.value[k];
     const bool beyond =
         r.u[k] < p.samples.i0 || r.u[k] > p.samples.i1 || r.v[k] < p.samples.j0 || r.v[k] > p.samples.j1;
     const double e = beyond ? p.error + p.rim : p.error;
@@ -223,6 +236,7 @@ void Batch::compose(const Database& db, const std::vector<Blend::Placed>& placed
     const PatchSurface& s = surface(db, p, c);
     read(p, s, options.smoothness, whole_);
     settle(p, c);
+    keep_floors(p, options);
     if (s.holes) fade_at_holes(*s.holes, options.smoothness);
     read(p, s, options.smoothness, part_);
     add(p, c, s, priority);

@@ -23,6 +23,7 @@ struct Blend::Placed {
   double quantum, base, origin;  // height = quantum (origin + code) + base
   std::int32_t source;           // 1 + place of the grid
   bool ragged;                   // has cells without data
+  bool has_rim;                  // the ramp is not the domain
   Extent bounds;
 
   LatticeRect window_bounds(const Point corners[4]) const;
@@ -57,6 +58,7 @@ class Batch {
   // Points that the current patch reaches, in window coordinates.
   struct Reached {
     std::vector<double> u, v, weight, value;
+    std::vector<double> floor;      // the weight without holes and rims
     std::vector<std::uint32_t> at;  // which points these are
     std::size_t n = 0;
   };
@@ -67,6 +69,7 @@ class Batch {
   void split();
   void take_all();
   void drop_settled();
+  void keep_floors(const Blend::Placed& p, const BlendOptions& options);
   void fade_at_holes(const PatchSurface::Holes& holes, int smoothness);
   void read(const Blend::Placed& p, const PatchSurface& s, int smoothness, Reached& reached);
   void settle(const Blend::Placed& p, std::uint32_t place);

@@ -50,6 +50,8 @@ Blend::Placed place(const Database& db, PatchId id, int smoothness) {
   p.domain = to_window(domain, p, scale);
   p.samples = to_window({0, 0, shape.width() - 1.0, shape.height() - 1.0}, p, scale);
   p.ramp = ramp_of(p.kernel, p.domain, p.samples);
+  p.has_rim = p.ramp.i0 > p.domain.i0 || p.ramp.j0 > p.domain.j0 || p.ramp.i1 < p.domain.i1 ||
+              p.ramp.j1 < p.domain.j1;
   p.ragged = g.at(id.level(), id.bx(), id.by()).ragged();
   p.rim = g.info.rim_error;
   p.error = g.at(id.level(), id.bx(), id.by()).error[size_t(smoothness)];

@@ -32,7 +32,8 @@ constexpr double cubic_bspline(double a, double b, double c, double d, double t)
 }
 
 /// What every answering cell adds to its weight, so that the rim of the data speaks, and a filled cell where
-/// nothing else does (design: model, section 2).
-inline constexpr double kWeightFloor = 0x1p-60;
+/// nothing else does (design: model, section 2): this part of what the weight is without holes and rims, so
+/// that patches of several levels stay continuous there, and kRimFloor where that is 0 too.
+inline constexpr double kWeightFloor = 0x1p-60, kRimFloor = 0x1p-900;
 
 }  // namespace patchwork

@@ -16,9 +16,10 @@ namespace patchwork {
 
 namespace {
 
-// Shares of the memory setting: patches ready to evaluate, and the decoded chunks that they are cut from,
-// which are of no use afterwards.
-constexpr std::size_t kChunkShare = 32, kSurfaceShare = 4;
+// Shares of the memory setting: decoded chunks, and the patches that are cut from them. Both are small:
+// neighbouring points are evaluated together, and memory that is used again need not be cleared by the system
+// (on a mosaic of 12 300 patches that was a third of the time).
+constexpr std::size_t kChunkShare = 64, kSurfaceShare = 32;
 
 float round_down(double v) {
   const float f = float(v);

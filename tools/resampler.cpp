@@ -100,7 +100,7 @@ void Resampler::evaluate(int factor, int row, int rows, std::span<float* const> 
 
 double prefetch(const Database& db, std::span<const PatchId> patches, std::size_t memory) {
   const auto start = std::chrono::steady_clock::now();
-  if (patches.size() * sizeof(PatchSurface) > memory / 8) return 0;
+  if (patches.size() * sizeof(PatchSurface) > memory / 32) return 0;
   // By place, not by priority: neighbours are cut from the same chunks.
   std::vector<PatchId> order(patches.begin(), patches.end());
   std::sort(order.begin(), order.end());

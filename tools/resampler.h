@@ -54,7 +54,8 @@ class Resampler {
   std::vector<std::int32_t> source_;
 };
 
-/// Reads all patches of an extraction into the cache, in parallel, if they fit. Returns seconds.
+/// Reads all patches of an extraction into the cache, in parallel, if they fit. Returns seconds; 0 where they
+/// are read as the blend needs them.
 double prefetch(const Database& db, std::span<const PatchId> patches, std::size_t memory);
 
 }  // namespace patchwork::cli

@@ -176,8 +176,9 @@ struct Store::Impl {
   void prepare_file(bool may_create) {
     const std::int64_t application = pragma("PRAGMA application_id"), version = pragma("PRAGMA user_version");
     const bool blank = application == 0 && version == 0 && pragma("SELECT count(*) FROM sqlite_schema") == 0;
-    if (blank && may_create) {
-      exec("PRAGMA page_size = 8192; PRAGMA journal_mode = WAL; BEGIN IMMEDIATE");
+    if (blank && may_create) {  // pages of 4 KiB: with 8 KiB Puget Sound (1025^2, 16 bit) took 6 % more,
+                                // above its raw samples
+      exec("PRAGMA page_size = 4096; PRAGMA journal_mode = WAL; BEGIN IMMEDIATE");
       exec(kSchema);
       exec(("PRAGMA application_id = " + std::to_string(kApplicationId) +
             "; PRAGMA user_version = " + std::to_string(kSchemaVersion) + "; COMMIT")

@@ -18,15 +18,22 @@ kernels::WindowMap window_map(const Blend::Placed& p) {
   return {p.x0, p.y0, p.ua, p.ub, p.va, p.vb, p.first_i, p.first_j};
 }
 
+// Of a cell: nearer to an edge than this a point lies on it. A raster that is meant to hit the samples misses
+// them by the rounding of its origin (1e-9 m at 5e6 m, 1e-7 of a cell of 1 cm).
+constexpr double kOnEdge = 0x1p-20;
+
 int cell_at(double u) { return std::clamp(int(u), 1, kSide - 3); }
 
 // A property of the closed cells at a window point: on an edge or a corner any of the cells that share it
 // will do.
 bool any_cell(const std::array<std::uint8_t, kSide * kSide>& cells, double u, double v) {
   const int i = cell_at(u), j = cell_at(v);
-  const bool left = u == i, below = v == j;
-  const auto at = [&](int a, int b) { return cells[size_t(b * kSide + a)] != 0; };
-  return at(i, j) || (left && at(i - 1, j)) || (below && at(i, j - 1)) || (left && below && at(i - 1, j - 1));
+  const int i0 = u - i <= kOnEdge ? i - 1 : i, i1 = i + 1 - u <= kOnEdge ? i + 1 : i;
+  const int j0 = v - j <= kOnEdge ? j - 1 : j, j1 = j + 1 - v <= kOnEdge ? j + 1 : j;
+  for (int b = j0; b <= j1; ++b)
+    for (int a = i0; a <= i1; ++a)
+      if (cells[size_t(b * kSide + a)] != 0) return true;
+  return false;
 }
 
 // 1 a feather away from cells without data, 0 on them, C^k between: B-splines over the capped distance of the
@@ -181,8 +188,8 @@ void Batch::add(const Blend::Placed& p, std::uint32_t place, const PatchSurface&
     const std::uint32_t i = r.at[k];
     const double own = r.weight[k] + (kWeightFloor * r.floor[k] + kRimFloor);
     const double w = own * (priority ? rest_[i] : p.volume), h = r.value[k];
-    const bool beyond =
-        r.u[k] < p.samples.i0 || r.u[k] > p.samples.i1 || r.v[k] < p.samples.j0 || r.v[k] > p.samples.j1;
+    const bool beyond = r.u[k] < p.samples.i0 - kOnEdge || r.u[k] > p.samples.i1 + kOnEdge ||
+                        r.v[k] < p.samples.j0 - kOnEdge || r.v[k] > p.samples.j1 + kOnEdge;
     const double e = beyond ? p.error + p.rim : p.error;
     if (reads_[i]++ == 0) {
       touched_[touches_++] = i;

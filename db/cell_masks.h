@@ -13,7 +13,9 @@ class CellMasks {
  public:
   /// kOutside: without data and joined to the grid's border by others like it (a ragged or warped survey's
   /// surroundings); holes inside a survey are often single cells, and it should fade towards them over less.
-  enum Cell : std::uint8_t { kReal = 1, kAnswering = 2, kOutside = 4 };
+  /// kVertex, in stored chunks of level 0 only: the sample at which the cell starts holds data (one without a
+  /// whole cell around it has no surface, but goes back to whoever wants the grid's samples).
+  enum Cell : std::uint8_t { kReal = 1, kAnswering = 2, kOutside = 4, kVertex = 8 };
   bool empty() const { return levels_.empty(); }
   int cols(int level) const { return levels_[size_t(level)].cols; }
   int rows(int level) const { return levels_[size_t(level)].rows; }

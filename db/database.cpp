@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "db/cell_masks.h"
 #include "db/database_impl.h"
 #include "db/error.h"
 #include "db/surface_pool.h"
@@ -19,7 +20,11 @@ namespace {
 // Shares of the memory setting: decoded chunks, and the patches that are cut from them. Both are small:
 // neighbouring points are evaluated together, and memory that is used again need not be cleared by the system
 // (on a mosaic of 12 300 patches that was a third of the time).
-constexpr std::size_t kChunkShare = 64, kSurfaceShare = 32;
+// The structure's share, a quarter, holds the records and tree pages of 10^9 samples.
+constexpr std::size_t kChunkShare = 64, kSurfaceShare = 32, kStructureShare = 4;
+constexpr const char* kRestore =
+    "see: patchwork check; restore the file from a copy, or import the grid again";
+constexpr const char* kRepair = "run: patchwork check --repair, which makes it from the patches";
 
 float round_down(double v) {
   const float f = float(v);
@@ -88,50 +93,108 @@ class Window : public CellSource {
 
 }  // namespace
 
-LodBox lod_box(const Grid& grid, std::size_t index) {
-  const GridShape::Block b = grid.info.shape.block(index);
-  const Extent e = grid.info.frame.bounds(grid.info.shape.domain(b.level, b.bx, b.by));
-  const PatchRecord& p = grid.patches[index];
-  return {e.xmin, e.ymin, e.xmax, e.ymax, p.best() ? 0.f : round_down(p.bottom), round_up(p.top)};
+LodBox lod_box(const GridInfo& grid, std::size_t index, const PatchRecord& patch) {
+  const GridShape::Block b = grid.shape.block(index);
+  const Extent e = grid.frame.bounds(grid.shape.domain(b.level, b.bx, b.by));
+  return {e.xmin, e.ymin, e.xmax, e.ymax, patch.best() ? 0.f : round_down(patch.bottom), round_up(patch.top)};
 }
 
-Database::Impl::Impl(Store opened, std::size_t memory)
-    : store(std::move(opened)), chunks(memory / kChunkShare), surfaces(memory / kSurfaceShare) {}
+Database::Impl::Impl(std::unique_ptr<Store> opened, std::size_t memory)
+    : store(std::move(opened)),
+      structure_share(memory / kStructureShare),
+      chunks(memory / kChunkShare),
+      surfaces(memory / kSurfaceShare) {}
+
+std::optional<Bytes> Database::Impl::blob(Store::Kind kind, std::uint64_t key) {
+  const std::lock_guard lock(store_mutex);
+  return store->blob(kind, key);
+}
+
+PatchRecords Database::Impl::stored_records(const GridInfo& grid) {
+  const std::size_t patches = grid.shape.blocks();
+  return PatchRecords(patches, [this, patches, id = grid.id, name = grid.name](std::size_t run) {
+    const auto bytes = blob(Store::Kind::records, first_key(id) | run);
+    if (!bytes) throw Error(store->path(), "patch records of " + name + " are missing", kRestore);
+    std::string problem;
+    auto made = std::make_unique<RecordRun>(RecordRun::from_bytes(*bytes, run, patches, problem));
+    if (!problem.empty())
+      throw Error(store->path(), "a run of patch records of " + name + " " + problem, kRestore);
+    ++runs_read;
+    return made;
+  });
+}
 
 void Database::Impl::load() {
-  crs = store.fact("crs").value_or("");
-  grids.clear();
-  for (GridInfo& info : store.grids()) {
-    Grid g{std::move(info), {}, {}};
-    g.patches = store.patches(g.info);
-    if (g.info.holes) g.offers = store.offers(g.info);
-    grids.push_back(std::move(g));
-  }
-  counts = {};
-  const auto count = [&](const char* key) { return std::stoull(store.fact(key).value_or("0")); };
+  crs = store->fact("crs").value_or("");
+  const auto count = [&](const char* key) { return std::stoull(store->fact(key).value_or("0")); };
+  version = count("version");
   counts = {count("decided_integer"), count("decided_interval"), count("decided_exact")};
-  const auto stored = store.tree_pages();
-  if (stored.empty()) {
-    tree = LodTree();
-    return;
+  std::vector<Grid> before = std::move(grids);
+  grids.clear(), runs_read = 0;
+  for (GridInfo& info : store->grids()) {
+    PatchRecords records = stored_records(info);
+    grids.push_back({std::move(info), std::move(records)});
   }
-  std::vector<LodTree::StoredPage> pages;
-  for (const auto& [id, bytes] : stored)
-    if (id >= kFirstTreePage) pages.push_back({id - kFirstTreePage, bytes});
-  tree = LodTree::from_pages(stored.front().second, pages);
+  const auto is_there = [&](const Grid& old) {
+    return std::any_of(grids.begin(), grids.end(), [&](const Grid& g) {
+      return g.info.id == old.info.id && g.info.digest == old.info.digest;
+    });
+  };
+  if (!std::all_of(before.begin(), before.end(), is_there)) chunks.clear(), surfaces.clear();
+  tree = LodTree(), tree_damage.reset();
+  try {
+    const auto header = store->blob(Store::Kind::tree_page, 0);
+    if (header)
+      tree = LodTree::open(*header, [this](std::uint32_t page) {
+        const auto bytes = blob(Store::Kind::tree_page, tree_page_key(page));
+        if (!bytes) throw Error(store->path(), "a page of the R-tree is missing", kRepair);
+        return *bytes;
+      });
+    if (!header && !grids.empty()) throw Error(store->path(), "the R-tree is missing", kRepair);
+  } catch (const Error& e) {
+    tree_damage = e;
+  }
+}
+
+void Database::Impl::change(const std::function<bool()>& work) {
+  store->rollback();
+  store->begin_write();
+  const auto settle = [&](bool keep) {
+    const std::uint64_t mine = version;
+    store->begin_read();
+    if (!keep || std::stoull(store->fact("version").value_or("0")) != mine) load();
+  };
+  try {
+    load();  // another process may have written since this one looked
+    const bool keep = work();
+    keep ? store->commit() : store->rollback();
+    settle(keep);
+  } catch (...) {
+    store->rollback();
+    settle(false);
+    throw;
+  }
+}
+
+void Database::Impl::trim() {
+  const auto used = [&] {
+    return tree.loaded_pages() * sizeof(LodPage) + runs_read * RecordRun::kRecords * sizeof(PatchRecord);
+  };
+  if (used() <= structure_share) return;
+  const std::unique_lock alone(structure, std::try_to_lock);
+  if (!alone || used() <= structure_share) return;
+  tree.drop_pages();
+  for (Grid& g : grids) g.patches.runs().drop_unchanged();
+  runs_read = 0;
 }
 
 std::shared_ptr<const Chunk> Database::Impl::chunk(const GridInfo& grid, int level, int cx, int cy) {
   const std::uint64_t key = PatchId::make(grid.id, level, cx, cy).value;
   return chunks.get(key, sizeof(std::int32_t) * kChunkVertices * kChunkVertices, [&] {
-    std::optional<Bytes> bytes;
-    {
-      const std::lock_guard lock(store_mutex);
-      bytes = store.payload(grid.id, level, cx, cy);
-    }
+    const std::optional<Bytes> bytes = blob(Store::Kind::payload, key);
     auto chunk = std::make_shared<Chunk>(make_chunk(grid.shape, level, cx, cy));
     const std::string bad = bytes ? decode_chunk(*bytes, *chunk) : "a payload chunk is missing";
-    if (!bad.empty()) throw Error(store.path(), grid.name + ": " + bad, "restore the file from a copy");
+    if (!bad.empty()) throw Error(store->path(), grid.name + ": " + bad, kRestore);
     return chunk;
   });
 }
@@ -140,8 +203,14 @@ std::size_t Database::Impl::place(GridId id) const {
   const auto it = std::lower_bound(grids.begin(), grids.end(), id,
                                    [](const Grid& g, GridId wanted) { return g.info.id < wanted; });
   if (it == grids.end() || it->info.id != id)
-    throw Error(store.path(), "the R-tree names a grid that is not there");
+    throw Error(store->path(), "the R-tree names a grid that is not there", kRepair);
   return size_t(it - grids.begin());
+}
+
+std::size_t Database::Impl::place(const std::string& name) const {
+  for (std::size_t g = 0; g < grids.size(); ++g)
+    if (grids[g].info.name == name) return g;
+  throw Error(store->path(), "it has no grid named " + name, "see: patchwork list DB");
 }
 
 Database::Database(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -149,34 +218,69 @@ Database::Database(Database&&) noexcept = default;
 Database& Database::operator=(Database&&) noexcept = default;
 Database::~Database() = default;
 
-Database Database::open(const std::string& path, std::size_t memory) {
-  Database db(std::make_unique<Impl>(Store::open(path, Store::Mode::read), memory));
-  db.impl_->store.begin_read();
+Database Database::in_mode(StoreMode mode, const std::string& path, std::size_t memory) {
+  Database db(std::make_unique<Impl>(open_store(path, mode), memory));
+  db.impl_->store->begin_read();
   db.impl_->load();
   return db;
+}
+
+Database Database::open(const std::string& path, std::size_t memory) {
+  return in_mode(StoreMode::read, path, memory);
+}
+
+Database Database::open_existing(const std::string& path, std::size_t memory) {
+  return in_mode(StoreMode::write, path, memory);
 }
 
 Database Database::open_or_create(const std::string& path, const std::string& crs, std::size_t memory) {
-  Database db(std::make_unique<Impl>(Store::open(path, Store::Mode::create), memory));
-  Store& store = db.impl_->store;
-  store.begin_write();
-  const std::string known = store.fact("crs").value_or("");
-  if (known.empty() && !crs.empty() && store.grids().empty()) store.set_fact("crs", crs);
-  store.commit();
+  Database db(std::make_unique<Impl>(open_store(path, StoreMode::create), memory));
+  Store& store = *db.impl_->store;
+  const auto free = [&] { return store.fact("crs").value_or("").empty() && store.grids().empty(); };
+  if (!crs.empty() && free()) {
+    store.begin_write();
+    if (free()) store.set_fact("crs", crs);
+    store.commit();
+  }
+  store.begin_read();
   db.impl_->load();
   return db;
 }
 
-const std::string& Database::path() const { return impl_->store.path(); }
+bool Database::refresh() {
+  Store& store = *impl_->store;
+  const std::uint64_t before = impl_->version;
+  store.rollback();
+  store.begin_read();
+  if (std::stoull(store.fact("version").value_or("0")) == before) return false;
+  impl_->load();
+  return true;
+}
+
+Database::Reading Database::reading() const {
+  impl_->trim();
+  return Reading(impl_->structure);
+}
+
+const std::string& Database::path() const { return impl_->store->path(); }
+std::uint64_t Database::version() const { return impl_->version; }
+std::vector<Change> Database::changed_since(std::uint64_t version) const {
+  const std::lock_guard lock(impl_->store_mutex);
+  return impl_->store->changes_after(version);
+}
 const std::string& Database::crs() const { return impl_->crs; }
 std::span<const Grid> Database::grids() const { return impl_->grids; }
 const Grid& Database::grid(GridId id) const { return impl_->grids[impl_->place(id)]; }
-const PatchRecord& Database::patch(PatchId id) const {
+PatchRecord Database::patch(PatchId id) const {
+  const Reading reading = this->reading();
   return grid(id.grid()).at(id.level(), id.bx(), id.by());
 }
-const LodTree& Database::tree() const { return impl_->tree; }
+const LodTree& Database::tree() const {
+  if (impl_->tree_damage) throw Error(*impl_->tree_damage);
+  return impl_->tree;
+}
 CoverageCounts Database::coverage_counts() const { return impl_->counts; }
-std::uint64_t Database::file_bytes() const { return impl_->store.file_bytes(); }
+std::uint64_t Database::file_bytes() const { return impl_->store->file_bytes(); }
 
 Extent Database::extent() const {
   Extent all{INFINITY, INFINITY, -INFINITY, -INFINITY};
@@ -205,8 +309,10 @@ std::string Database::content_hash() const {
   XXH3_128bits_reset(state);
   for (const Grid* g : order) {  // a digest covers the grid's samples, of which the stored levels are made
     XXH3_128bits_update(state, g->info.digest.data(), g->info.digest.size());
-    XXH3_128bits_update(state, g->patches.data(), g->patches.size() * sizeof(PatchRecord));
-    XXH3_128bits_update(state, g->offers.data(), g->offers.size() * sizeof(Offer));
+    g->patches.runs().each([&](const RecordRun& run) {
+      XXH3_128bits_update(state, run.records.data(), run.records.size() * sizeof(PatchRecord));
+      XXH3_128bits_update(state, run.offers.data(), run.offers.size() * sizeof(Offer));
+    });
   }
   const XXH128_hash_t h = XXH3_128bits_digest(state);
   XXH3_freeState(state);
@@ -228,6 +334,23 @@ std::shared_ptr<const PatchSurface> Database::surface(PatchId id) const {
     if (patch(id).ragged()) s->holes = make_holes(window, level, id.bx(), id.by());
     return s;
   });
+}
+
+void Database::read_samples(GridId id, int row, int rows, std::span<double> out) const {
+  const GridInfo& g = grid(id).info;
+  const int width = g.shape.width();
+  const double raw_quantum = g.quantum / g.raw_scale;  // exact: a power of two where storage is lossless
+  for (int j = row; j < row + rows; ++j)
+    for (int i = 0; i < width;) {
+      const auto c = impl_->chunk(g, 0, i / kChunkVertices, j / kChunkVertices);
+      const int first = i / kChunkVertices * kChunkVertices, end = std::min(width, first + kChunkVertices);
+      for (; i < end; ++i) {
+        const auto at = size_t(j % kChunkVertices) * size_t(c->cols) + size_t(i - first);
+        const bool valid = c->cells.empty() || (c->cells[at] & CellMasks::kVertex);
+        out[size_t(j - row) * size_t(width) + size_t(i)] =
+            valid ? raw_quantum * (double(g.code_origin) + c->codes[at]) : std::nan("");
+      }
+    }
 }
 
 }  // namespace patchwork

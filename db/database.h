@@ -5,16 +5,19 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <shared_mutex>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "db/check.h"
 #include "db/coverage.h"
 #include "db/grid.h"
 #include "db/ingest.h"
 #include "db/lod_tree.h"
 #include "db/patch_surface.h"
 #include "db/raster.h"
+#include "db/store.h"
 
 namespace patchwork {
 
@@ -24,7 +27,9 @@ struct ImportOptions {
   std::string name = {};                ///< of the grid; unique in the database
   std::size_t memory = kDefaultMemory;  ///< bytes
   bool dry_run = false;                 ///< all of it, then nothing is kept
-  Progress progress = {};               ///< share done; may be empty
+  double tolerance = 0;      ///< metres by which a stored sample may differ from the file's; enters the bound
+  std::string replace = {};  ///< a grid that goes out in the same transaction; may have the new one's name
+  Progress progress = {};    ///< share done; may be empty
 };
 
 struct ImportReport {
@@ -36,18 +41,31 @@ struct ImportReport {
   std::size_t dormant = 0;   ///< of the added, redundant from the start
   std::size_t hidden = 0;    ///< patches of other grids that became redundant
   std::size_t lowered = 0;   ///< patches of other grids whose top came down, the hidden among them
+  std::size_t removed = 0;   ///< patches of the grid that was replaced
+  std::size_t woken = 0;     ///< patches of other grids that this one had hidden
   Extent extent;
   struct Seconds {
     double scan = 0, errors = 0, encode = 0, invariant = 0, store = 0, total = 0;
   } seconds;
 };
 
-/// One state of a database file. Reading is safe from many threads; importing is not, and moves this object
-/// to the new state.
+struct RemoveReport {
+  std::string name;
+  std::size_t patches = 0;  ///< gone
+  std::size_t woken = 0;    ///< patches of other grids that are no longer redundant
+  std::size_t raised = 0;   ///< patches of other grids whose top went up, the woken among them
+  Extent extent;
+  double seconds = 0;
+};
+
+/// One state of a database file. Reading is safe from many threads, beside a writer in this or another
+/// process; refreshing, importing and removing are not, and move this object to a new state.
 class Database {
  public:
   /// Throws Error: no such file, another program's database, a newer schema, damage.
   static Database open(const std::string& path, std::size_t memory = kDefaultMemory);
+  /// Opens for writing.
+  static Database open_existing(const std::string& path, std::size_t memory = kDefaultMemory);
   /// Opens for writing, making the file (with this CRS, WKT2 or empty) where there is none.
   static Database open_or_create(const std::string& path, const std::string& crs,
                                  std::size_t memory = kDefaultMemory);
@@ -55,12 +73,23 @@ class Database {
   Database& operator=(Database&&) noexcept;
   ~Database();
 
+  /// Moves to the newest state; false if this is it. Cached heights stay where their grids do.
+  bool refresh();
+  /// Counts committed changes; the same for every reader of the same state.
+  std::uint64_t version() const;
+  /// What came and went after `version`, up to this state, oldest first: where a client must look again.
+  std::vector<Change> changed_since(std::uint64_t version) const;
+
   const std::string& path() const;
   const std::string& crs() const;  ///< WKT2, empty where no grid named one
   std::span<const Grid> grids() const;
   const Grid& grid(GridId id) const;
-  const PatchRecord& patch(PatchId id) const;
+  PatchRecord patch(PatchId id) const;
   const LodTree& tree() const;
+  /// Held while references into a grid's records, or the tree's pages, are used: what is read stays in memory
+  /// until then, and is let go of later when it takes more than a quarter of the memory setting.
+  using Reading = std::shared_lock<std::shared_mutex>;
+  Reading reading() const;
   Extent extent() const;  ///< of all footprints
   CoverageCounts coverage_counts() const;
   std::uint64_t file_bytes() const;
@@ -74,15 +103,30 @@ class Database {
 
   /// Adds a grid in one transaction: either all of it is there afterwards or nothing of it. Throws Error.
   ImportReport import(const RasterSource& source, const ImportOptions& options);
+  /// Takes a grid out in one transaction; whatever it had hidden comes back. Throws Error: no such grid.
+  RemoveReport remove(const std::string& name);
+
+  /// What does not hold: file, records, heights' checksums, tops and flags (evaluated from scratch), R-tree.
+  std::vector<Problem> check(const Progress& progress = {}) const;
+  /// Makes anew what can be derived: tops, flags and R-tree; drops what belongs to no grid.
+  RepairReport repair(const Progress& progress = {});
+
+  /// Raw samples of a grid as its file had them (see GridInfo::raw_scale), rows [row, row + rows), row-major;
+  /// NaN where there is no data. REQUIRES: the rows are inside the grid, and `out` holds them.
+  void read_samples(GridId grid, int row, int rows, std::span<double> out) const;
 
   struct Impl;
 
  private:
   explicit Database(std::unique_ptr<Impl> impl);
+  static Database in_mode(StoreMode mode, const std::string& path, std::size_t memory);
   std::unique_ptr<Impl> impl_;
 };
 
 /// The box of a patch in LOD space, rounded outward; bottom 0 where it is best available somewhere.
-LodBox lod_box(const Grid& grid, std::size_t index);
+LodBox lod_box(const GridInfo& grid, std::size_t index, const PatchRecord& patch);
+inline LodBox lod_box(const Grid& grid, std::size_t index) {
+  return lod_box(grid.info, index, grid.patches[index]);
+}
 
 }  // namespace patchwork

@@ -1,9 +1,12 @@
-// What Database hides: the store, the loaded state and the caches (shared by database.cpp and import.cpp).
+// What Database hides: the store, the state read from it and the caches.
 #pragma once
 
+#include <atomic>
 #include <mutex>
+#include <shared_mutex>
 
 #include "db/database.h"
+#include "db/error.h"
 #include "db/lru_cache.h"
 #include "db/payload.h"
 #include "db/store.h"
@@ -11,23 +14,39 @@
 namespace patchwork {
 
 struct Database::Impl {
-  Impl(Store opened, std::size_t memory);
-  /// Reads structure and tree within the store's current transaction.
+  Impl(std::unique_ptr<Store> opened, std::size_t memory);
+
+  /// Takes grids and tree as the store's current transaction has them; records and pages are read when asked
+  /// for. Cached heights stay unless a grid is gone.
   void load();
+  /// Runs `work` in a write transaction that it ends with commit(), true, or rollback(), false; afterwards,
+  /// whatever happens, this is a state of the store.
+  void change(const std::function<bool()>& work);
+  /// Lets go of records and pages if they take more than their share of memory and nobody reads.
+  void trim();
+
+  std::optional<Bytes> blob(Store::Kind kind, std::uint64_t key);
+  PatchRecords stored_records(const GridInfo& grid);
   std::shared_ptr<const Chunk> chunk(const GridInfo& grid, int level, int cx, int cy);
   std::size_t place(GridId id) const;
+  std::size_t place(const std::string& name) const;  ///< throws Error: there is none
 
-  Store store;
-  std::mutex store_mutex;  // the store is one connection; payloads are read from many threads
+  std::unique_ptr<Store> store;
+  std::mutex store_mutex;       // the store is one connection; blobs are read from many threads
+  std::shared_mutex structure;  // shared by those who hold references into records or pages
+  std::size_t structure_share;  // bytes
+  std::atomic<std::size_t> runs_read{0};
   std::string crs;
+  std::uint64_t version = 0;
   std::vector<Grid> grids;  // by id
   LodTree tree;
+  std::optional<Error> tree_damage;  // why the tree could not be opened
   CoverageCounts counts;
   LruCache<std::uint64_t, Chunk> chunks;
   LruCache<std::uint64_t, PatchSurface> surfaces;
 };
 
-/// The first page number of the store that holds a tree page; page 0 holds the tree's header.
-inline constexpr std::uint32_t kFirstTreePage = 1;
+/// The key of page n of the R-tree; key 0 holds the tree's header.
+constexpr std::uint64_t tree_page_key(std::uint32_t page) { return std::uint64_t{page} + 1; }
 
 }  // namespace patchwork

@@ -11,7 +11,13 @@ class Error : public std::runtime_error {
  public:
   /// `where` names a file, grid or option; `advice` may be empty.
   Error(const std::string& where, const std::string& problem, const std::string& advice = {})
-      : std::runtime_error(where + ": " + problem + (advice.empty() ? "" : "; " + advice)) {}
+      : std::runtime_error(where + ": " + problem + (advice.empty() ? "" : "; " + advice)),
+        problem_(problem) {}
+  /// What went wrong alone, for lists of problems.
+  const std::string& problem() const { return problem_; }
+
+ private:
+  std::string problem_;
 };
 
 }  // namespace patchwork

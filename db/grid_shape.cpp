@@ -40,12 +40,23 @@ LatticeRect GridShape::domain(int level, int bx, int by) const {
           end(by, blocks_j(level), f.j1)};
 }
 
+std::size_t GridShape::index(int level, int bx, int by) const {
+  const Level& l = levels_[size_t(level)];
+  const int tx = bx / kTile * kTile, ty = by / kTile * kTile;  // the tile's first block
+  const int width = std::min(kTile, l.bi - tx), height = std::min(kTile, l.bj - ty);
+  const int before = ty * l.bi + tx * height;
+  return l.first + size_t(before + (by - ty) * width + (bx - tx));
+}
+
 GridShape::Block GridShape::block(std::size_t index) const {
   int level = 0;
   while (level + 1 < levels() && index >= levels_[size_t(level) + 1].first) ++level;
   const Level& l = levels_[size_t(level)];
-  const std::size_t k = index - l.first;
-  return {level, int(k % size_t(l.bi)), int(k / size_t(l.bi))};
+  const int k = int(index - l.first);
+  const int ty = k / (kTile * l.bi) * kTile, height = std::min(kTile, l.bj - ty);
+  const int in_row = k - ty * l.bi, tx = in_row / (kTile * height) * kTile;
+  const int in_tile = in_row - tx * height, width = std::min(kTile, l.bi - tx);
+  return {level, tx + in_tile % width, ty + in_tile / width};
 }
 
 }  // namespace patchwork

@@ -47,12 +47,10 @@ class GridShape {
   LatticeRect kernel(int level, int bx, int by) const;
   LatticeRect domain(int level, int bx, int by) const;
 
-  /// Number of blocks of all levels, and the place of one in a flat array of them (level, row, column).
+  /// Number of blocks of all levels, and the place of one in a flat array of them: by level, then by tiles of
+  /// 16 x 16 blocks (rows of tiles, tiles, rows of blocks, blocks), so that neighbours lie together.
   std::size_t blocks() const { return blocks_; }
-  std::size_t index(int level, int bx, int by) const {
-    const Level& l = levels_[size_t(level)];
-    return l.first + size_t(by) * size_t(l.bi) + size_t(bx);
-  }
+  std::size_t index(int level, int bx, int by) const;
   struct Block {
     int level, bx, by;
   };
@@ -66,6 +64,7 @@ class GridShape {
   int width_ = 2, height_ = 2;
   double pad_ = 0;
   LatticeRect core_;
+  static constexpr int kTile = 16;
   std::vector<Level> levels_;
   std::size_t blocks_ = 0;
 };

@@ -2,7 +2,6 @@
 // one transaction.
 #define XXH_INLINE_ALL
 #include <fmt/format.h>
-#include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <xxhash.h>
 
@@ -12,19 +11,17 @@
 
 #include "db/database_impl.h"
 #include "db/error.h"
-#include "db/invariant.h"
 #include "db/patch_errors.h"
+#include "db/restate.h"
 
 namespace patchwork {
 
 namespace {
 
-// Below this share of changed boxes the tree is changed box by box, above it is packed anew.
-constexpr double kRebuildShare = 0.25;
 constexpr double kRimFactor =
     0.375;  // (t^2 + t) / 2 at half a cell: what a second difference makes of extrapolation
 constexpr int kTaskRows = kChunkVertices;
-constexpr std::size_t kMaxGrids = 0xffff;
+constexpr std::size_t kMaxGrids = 0x7ffe;
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -79,7 +76,7 @@ class Importer {
       : db_(db),
         options_(options),
         source_(source),
-        ingest_(source, options.memory, [&](double share) { say(0.2 * share); }),
+        ingest_(source, options.memory, options.tolerance, [&](double share) { say(0.2 * share); }),
         errors_(ingest_.shape(), ingest_.masks()) {
     watch_.add_to(report_.seconds.scan);
   }
@@ -92,16 +89,15 @@ class Importer {
       digest(band);
       measure(band);
       watch_.add_to(report_.seconds.errors);
-      for (const Lattice& l : band.levels) encode(l, band.y0 >> l.level(), chunk_end(l, band.y1));
+      for (const Lattice& l : band.levels) encode(l, band.y0 >> l.level(), chunk_end(l, band.y1), &band);
       say(0.2 + 0.7 * double(band.y1) / shape().height());
     }
     for (int l = Ingest::kStreamedLevels; l < shape().levels(); ++l)
-      encode(ingest_.coarse(l), 0, shape().lattice_rows(l));
+      encode(ingest_.coarse(l), 0, shape().lattice_rows(l), nullptr);
     watch_.add_to(report_.seconds.encode);
     finish_grid();
     if (!report_.duplicate_of.empty()) return report_;
     add_to_state();
-    watch_.add_to(report_.seconds.invariant);
     return report_;
   }
 
@@ -119,6 +115,7 @@ class Importer {
     g.quantum = source_.scale() * q.quantum, g.base = source_.offset(), g.code_origin = q.origin;
     g.quantisation = q.error * std::abs(source_.scale());
     g.holes = !ingest_.masks().empty(), g.sample_bytes = source_.sample_bytes();
+    g.sample_type = source_.sample_type(), g.raw_scale = source_.scale(), g.nodata = source_.nodata();
     const double numbers[] = {g.accuracy,
                               g.quantum,
                               g.base,
@@ -128,10 +125,12 @@ class Importer {
                               double(g.shape.height())};
     digest_.add(numbers, std::size(numbers));
     digest_.add(g.frame.numbers().data(), g.frame.numbers().size());
-    // The row is needed first: payloads name the grid's id. Name and digest are set right at the end.
-    g.digest = provisional_digest();
-    g.id = db_.store.add_grid(g);
-    if (g.id.value > kMaxGrids) throw Error(db_.store.path(), "it holds as many grids as it can");
+    // The row is needed first: payloads name the grid's id. Name and digest are set right at the end; until
+    // then a grid that is to be replaced may have the name.
+    g.digest = provisional_digest(), g.name = "(import) " + options_.name;
+    g.id = db_.store->add_grid(g);
+    g.name = options_.name;
+    if (g.id.value > kMaxGrids) throw Error(db_.store->path(), "it holds as many grids as it can");
   }
   Digest provisional_digest() const {
     DigestBuilder d;
@@ -183,20 +182,23 @@ class Importer {
     return y1 == shape().height() ? l.rows() : y1 >> l.level();
   }
 
-  void encode(const Lattice& l, int r0, int r1) {
+  void encode(const Lattice& l, int r0, int r1, const Ingest::Band* band) {
     const int first = r0 / kChunkVertices, end = (r1 + kChunkVertices - 1) / kChunkVertices;
     const int across = shape().chunks_i(l.level());
     std::vector<Bytes> blobs(size_t(std::max(0, end - first)) * size_t(across));
     tbb::parallel_for(size_t(0), blobs.size(), [&](std::size_t k) {
-      blobs[k] = encode_chunk(cut_chunk(l, int(k) % across, first + int(k) / across));
+      blobs[k] = encode_chunk(cut_chunk(l, int(k) % across, first + int(k) / across, band));
     });
     watch_.add_to(report_.seconds.encode);
     for (std::size_t k = 0; k < blobs.size(); ++k)
-      db_.store.put_payload(grid_.info.id, l.level(), int(k) % across, first + int(k) / across, blobs[k]);
+      db_.store->put_blob(
+          Store::Kind::payload,
+          PatchId::make(grid_.info.id, l.level(), int(k) % across, first + int(k) / across).value, blobs[k]);
     watch_.add_to(report_.seconds.store);
   }
 
-  Chunk cut_chunk(const Lattice& l, int cx, int cy) const {
+  // `band` holds the rows of level 0 that the lattice was made of.
+  Chunk cut_chunk(const Lattice& l, int cx, int cy, const Ingest::Band* band) const {
     Chunk c = make_chunk(shape(), l.level(), cx, cy);
     c.codes.resize(size_t(c.cols) * size_t(c.rows));
     for (int j = 0; j < c.rows; ++j) {
@@ -209,11 +211,19 @@ class Importer {
     bool real = true;
     for (int j = 0; j < c.rows; ++j)
       for (int i = 0; i < c.cols; ++i) {
-        c.cells.push_back(cells.cell(cx * kChunkVertices + i, cy * kChunkVertices + j));
+        const int x = cx * kChunkVertices + i, y = cy * kChunkVertices + j;
+        c.cells.push_back(cells.cell(x, y));
+        if (l.level() == 0 && holds_data(*band, x, y)) c.cells.back() |= CellMasks::kVertex;
         real &= (c.cells.back() & CellMasks::kReal) != 0;
       }
     if (real) c.cells.clear();
     return c;
+  }
+
+  bool holds_data(const Ingest::Band& band, int x, int y) const {
+    if (x >= shape().width() || y >= shape().height()) return false;
+    const int first = band.levels[0].first();
+    return band.valid.empty() || band.valid[size_t(y - first) * size_t(shape().width()) + size_t(x)];
   }
 
   void finish_grid() {
@@ -226,18 +236,18 @@ class Importer {
     report_.extent = g.frame.bounds(g.shape.footprint());
     if (!report_.duplicate_of.empty()) return;
     make_records();
-    if (std::none_of(grid_.patches.begin(), grid_.patches.end(),
-                     [](const PatchRecord& p) { return p.exists(); }))
-      throw Error(source_.path(), "it holds no cell with data at all four corners");
-    db_.store.update_grid(g);
+    bool exists = false;
+    grid_.patches.each([&](std::size_t, const PatchRecord& p) { exists |= p.exists(); });
+    if (!exists) throw Error(source_.path(), "it holds no cell with data at all four corners");
   }
 
   void make_records() {
-    grid_.patches.resize(shape().blocks());
+    grid_.patches = PatchRecords(shape().blocks());
     std::vector<Offer> offers(ingest_.masks().empty() ? 0 : shape().blocks());
-    tbb::parallel_for(size_t(0), grid_.patches.size(), [&](std::size_t k) {
+    std::vector<PatchRecord> records(shape().blocks());
+    tbb::parallel_for(size_t(0), records.size(), [&](std::size_t k) {
       const GridShape::Block b = shape().block(k);
-      PatchRecord& p = grid_.patches[k];
+      PatchRecord& p = records[k];
       p.flags = PatchRecord::kExists;
       double outline = 0;
       if (!offers.empty()) outline = look_at_holes(b, p, offers[k]), offers[k].index = std::uint32_t(k);
@@ -247,8 +257,9 @@ class Importer {
         p.error[i] = std::max(floor + delta[i] * std::abs(grid_.info.quantum), outline);
       p.bottom = b.level == 0 ? p.error[0] : *std::max_element(p.error.begin(), p.error.end());
     });
+    for (std::size_t k = 0; k < records.size(); ++k) grid_.patches.change(k) = records[k];
     for (const Offer& o : offers)
-      if (grid_.patches[o.index].exists() && grid_.patches[o.index].ragged()) grid_.offers.push_back(o);
+      if (records[o.index].exists() && records[o.index].ragged()) grid_.patches.add_offer(o);
   }
 
   // Sets the record's flags; returns the error that the outline of holes alone gives it, metres.
@@ -276,89 +287,19 @@ class Importer {
                   : 0;
   }
 
-  // The grid joins the others; tops and flags are evaluated for it and for whatever it overlaps.
+  // The grid joins the others; the report says what that does.
   void add_to_state() {
-    db_.grids.push_back(std::move(grid_));
-    const std::size_t added = db_.grids.size() - 1;
-    std::vector<PatchPlace> places;
-    const Extent extent = report_.extent;
-    for (std::size_t g = 0; g < db_.grids.size(); ++g) {
-      const GridInfo& info = db_.grids[g].info;
-      if (!info.frame.bounds(info.shape.footprint()).meets(extent)) continue;
-      for (std::size_t k = 0; k < db_.grids[g].patches.size(); ++k) {
-        if (!db_.grids[g].patches[k].exists()) continue;
-        const GridShape::Block b = info.shape.block(k);
-        if (g == added || info.frame.bounds(info.shape.kernel(b.level, b.bx, b.by)).meets(extent))
-          places.push_back({g, k});
-      }
-    }
-    update(places, added);
-  }
-
-  void update(const std::vector<PatchPlace>& places, std::size_t added) {
-    std::vector<Standing> standings(places.size());
-    tbb::enumerable_thread_specific<CoverageCounts> counts;
-    tbb::parallel_for(size_t(0), places.size(),
-                      [&](std::size_t k) { standings[k] = standing(db_.grids, places[k], counts.local()); });
-    for (const CoverageCounts& c : counts) db_.counts += c;
-    std::vector<std::vector<std::size_t>> changed(db_.grids.size());
-    std::vector<LodTree::Entry> out, in;
-    for (std::size_t k = 0; k < places.size(); ++k) {
-      Grid& g = db_.grids[places[k].grid];
-      PatchRecord& p = g.patches[places[k].index];
-      PatchRecord next = p;
-      next.top = standings[k].top;
-      next.flags = (p.flags & ~std::uint64_t{PatchRecord::kBest}) |
-                   (standings[k].best ? std::uint64_t{PatchRecord::kBest} : 0);
-      const bool is_new = places[k].grid == added;
-      if (next == p && !is_new) continue;
-      if (!is_new && !p.dormant()) out.push_back({lod_box(g, places[k].index), g.patch_id(places[k].index)});
-      report(p, next, is_new);
-      p = next;
-      if (!p.dormant()) in.push_back({lod_box(g, places[k].index), g.patch_id(places[k].index)});
-      changed[places[k].grid].push_back(places[k].index);
-    }
-    change_tree(out, in);
-    write(changed, added);
-  }
-
-  void report(const PatchRecord& before, const PatchRecord& after, bool is_new) {
-    if (is_new) {
-      ++report_.patches, report_.dormant += after.dormant();
-    } else {
-      report_.lowered += after.top < before.top;
-      report_.hidden += after.dormant() && !before.dormant();
-    }
-  }
-
-  void change_tree(const std::vector<LodTree::Entry>& out, const std::vector<LodTree::Entry>& in) {
-    if (double(out.size() + in.size()) < kRebuildShare * double(db_.tree.size())) {
-      for (const LodTree::Entry& e : out) db_.tree.erase(e);
-      for (const LodTree::Entry& e : in) db_.tree.insert(e);
-      return;
-    }
-    std::vector<LodTree::Entry> all;
-    for (const Grid& g : db_.grids)
-      for (std::size_t k = 0; k < g.patches.size(); ++k)
-        if (g.patches[k].exists() && !g.patches[k].dormant()) all.push_back({lod_box(g, k), g.patch_id(k)});
-    db_.tree = LodTree::build(all);
-    repacked_ = true;
-  }
-
-  void write(const std::vector<std::vector<std::size_t>>& changed, std::size_t added) {
-    for (std::size_t g = 0; g < changed.size(); ++g)
-      if (!changed[g].empty())
-        db_.store.put_patches(db_.grids[g], g == added ? std::span<const std::size_t>() : changed[g]);
-    if (!db_.grids[added].offers.empty()) db_.store.put_offers(db_.grids[added]);
-    if (repacked_) db_.store.erase_tree();
-    for (const std::uint32_t page : db_.tree.take_dirty_pages())
-      db_.store.put_tree_page(page + kFirstTreePage, db_.tree.page_bytes(page));
-    for (const std::uint32_t page : db_.tree.take_freed_pages())
-      db_.store.erase_tree_page(page + kFirstTreePage);
-    db_.store.put_tree_page(0, db_.tree.header_bytes());
-    db_.store.set_fact("decided_integer", std::to_string(db_.counts.integer));
-    db_.store.set_fact("decided_interval", std::to_string(db_.counts.interval));
-    db_.store.set_fact("decided_exact", std::to_string(db_.counts.exact));
+    Restate restate(db_);
+    if (!options_.replace.empty()) restate.remove(db_.place(options_.replace));
+    db_.store->update_grid(grid_.info);
+    restate.add(std::move(grid_));
+    watch_.add_to(report_.seconds.invariant);
+    const Extent& there = report_.extent;
+    restate.store((options_.replace.empty() ? "import " : "replace ") + report_.name, there);
+    watch_.add_to(report_.seconds.store);
+    const Restate::Effect& e = restate.effect();
+    report_.patches = e.added, report_.dormant = e.dormant, report_.hidden = e.hidden,
+    report_.lowered = e.lowered, report_.woken = e.woken, report_.removed = e.removed;
   }
 
   Database::Impl& db_;
@@ -371,39 +312,45 @@ class Importer {
   Grid grid_;
   DigestBuilder digest_;
   double rim_i_ = 0, rim_j_ = 0;
-  bool repacked_ = false;
 };
 
 }  // namespace
 
 ImportReport Database::import(const RasterSource& source, const ImportOptions& options) {
   const double start = now();
-  for (const Grid& g : impl_->grids)
-    if (g.info.name == options.name)
-      throw Error(source.path(), "the database has a grid named " + options.name + " already",
-                  "give another with --name");
-  Store& store = impl_->store;
-  store.rollback();
-  store.begin_write();
-  try {
-    impl_->load();  // another process may have written since this one looked
-    ImportReport report = Importer(*impl_, source, options).run();
-    const bool keep = !options.dry_run && report.duplicate_of.empty();
-    double committing = now();
-    if (keep) {
-      store.commit();
-    } else {
-      store.rollback();
-      impl_->load();
-    }
-    report.seconds.store += now() - committing;
-    report.seconds.total = now() - start;
-    return report;
-  } catch (...) {
-    store.rollback();
-    impl_->load();
-    throw;
-  }
+  ImportReport report;
+  double committing = start;
+  impl_->change([&] {
+    if (!options.replace.empty()) impl_->place(options.replace);
+    for (const Grid& g : impl_->grids)
+      if (g.info.name == options.name && options.name != options.replace)
+        throw Error(source.path(), "the database has a grid named " + options.name + " already",
+                    "give another with --name, or take its place with --replace " + options.name);
+    report = Importer(*impl_, source, options).run();
+    committing = now();
+    return !options.dry_run && report.duplicate_of.empty();
+  });
+  report.seconds.store += now() - committing;
+  report.seconds.total = now() - start;
+  return report;
+}
+
+RemoveReport Database::remove(const std::string& name) {
+  const double start = now();
+  RemoveReport report{.name = name, .extent = {}};
+  impl_->change([&] {
+    const std::size_t place = impl_->place(name);
+    const GridInfo& info = impl_->grids[place].info;
+    report.extent = info.frame.bounds(info.shape.footprint());
+    Restate restate(*impl_);
+    restate.remove(place);
+    restate.store("remove " + name, report.extent);
+    const Restate::Effect& e = restate.effect();
+    report.patches = e.removed, report.woken = e.woken, report.raised = e.raised;
+    return true;
+  });
+  report.seconds = now() - start;
+  return report;
 }
 
 }  // namespace patchwork

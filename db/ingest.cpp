@@ -59,7 +59,7 @@ PATCHWORK_VECTORIZED void codes_of(const double* raw, std::size_t n, double quan
 
 }  // namespace
 
-Ingest::Ingest(const RasterSource& source, std::size_t memory, const Progress& progress)
+Ingest::Ingest(const RasterSource& source, std::size_t memory, double tolerance, const Progress& progress)
     : source_(source), shape_(source.width(), source.height(), source.pixel_is_area()) {
   const std::size_t samples = size_t(shape_.width()) * size_t(shape_.height());
   const int chunk_rows = kChunkVertices << (kStreamedLevels - 1);
@@ -78,7 +78,7 @@ Ingest::Ingest(const RasterSource& source, std::size_t memory, const Progress& p
   means_.resize(size_t(means_cols_) * size_t(means_rows_));
   scan(progress);
   if (!(low_ <= high_)) throw Error(source.path(), "it holds no data: every sample is nodata");
-  choose_quantiser();
+  choose_quantiser(tolerance);
   if (!cells_.empty()) {
     fill_means();
     masks_ = CellMasks::from_cells(std::move(cells_), shape_);
@@ -165,7 +165,7 @@ void Ingest::note_cells(int y, int rows, const std::vector<std::uint8_t>& valid)
   }
 }
 
-void Ingest::choose_quantiser() {
+void Ingest::choose_quantiser(double tolerance) {
   const double range = high_ - low_;
   const double fits = std::exp2(std::ceil(std::log2(std::max(range, 1e-300) / kCodeRange)));
   if (source_.integer_samples()) {
@@ -177,8 +177,13 @@ void Ingest::choose_quantiser() {
     const double coarse = accuracy > 0 ? std::exp2(std::floor(std::log2(accuracy / 16))) : fits;
     quantiser_.quantum = exact >= fits && exact * 4 >= coarse ? exact : std::max(coarse, fits);
   }
+  // A hair below twice the tolerance, so that rounding the quotient cannot pass it.
+  const double wide = 2 * tolerance / std::abs(source_.scale()) * (1 - 0x1p-20);
+  const bool loose = wide > quantiser_.quantum;
+  if (loose) quantiser_.quantum = wide;
   const bool exact = quantiser_.quantum <= (source_.integer_samples() ? 1.0 : std::ldexp(1, finest_bit_));
   quantiser_.error = exact ? 0 : quantiser_.quantum / 2;
+  if (loose) quantiser_.error = tolerance / std::abs(source_.scale());
   const double largest = std::max(std::abs(low_), std::abs(high_)) / quantiser_.quantum;
   if (largest >= kCodeRange)
     quantiser_.origin = std::int64_t(std::floor((low_ + range / 2) / quantiser_.quantum));

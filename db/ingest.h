@@ -31,8 +31,8 @@ class Ingest {
 
   /// Reads the source once: range, quantum, holes, coarse levels. Memory: `memory` bytes hold the raw samples
   /// if they fit in a quarter of it, else the source is read again in bands. Throws Error: all nodata, and
-  /// what reading throws.
-  Ingest(const RasterSource& source, std::size_t memory, const Progress& progress);
+  /// what reading throws. `tolerance`: metres by which a stored sample may differ from the source's.
+  Ingest(const RasterSource& source, std::size_t memory, double tolerance = 0, const Progress& progress = {});
 
   const GridShape& shape() const { return shape_; }
   const Quantiser& quantiser() const { return quantiser_; }
@@ -56,7 +56,7 @@ class Ingest {
   template <class Raw>
   void scan_rows(int y, int rows, const Raw* raw);
   void note_cells(int y, int rows, const std::vector<std::uint8_t>& valid);
-  void choose_quantiser();
+  void choose_quantiser(double tolerance);
   void fill_means();
   void make_coarse();
   double knot(int i, int j) const;

@@ -38,12 +38,6 @@ LatticeRect grown(LatticeRect r, int level) {
   return {r.i0 - g, r.j0 - g, r.i1 + g, r.j1 + g};
 }
 
-// Where a greater, better or equal patch of another grid may lie: blocks of a level whose kernels meet the
-// subject's bounds.
-struct BlockRange {
-  int i0, j0, i1, j1;
-};
-
 class Search {
  public:
   Search(std::span<const Grid> grids, PatchPlace place, CoverageCounts& counts)
@@ -101,7 +95,7 @@ class Search {
       for (int l = g.info.shape.levels(); l-- > 0;) {
         const double largest = std::ldexp(std::pow(kKernelCells, 2), 2 * l) * g.info.frame.cell_area();
         if (largest < s.area * (1 - kAreaDoubt)) break;
-        const BlockRange r = range(g, l, s);
+        const BlockRange r = blocks_near(g.info, l, s.bounds);
         for (int by = r.j0; by <= r.j1; ++by)
           for (int bx = r.i0; bx <= r.i1; ++bx) {
             const std::size_t k = g.info.shape.index(l, bx, by);
@@ -172,22 +166,6 @@ class Search {
       if (&g != &s.grid && g.info.frame.bounds(g.info.shape.footprint()).meets(s.bounds)) visit(g);
   }
 
-  static BlockRange range(const Grid& g, int level, const Subject& s) {
-    double i0 = kInfinity, j0 = kInfinity, i1 = -kInfinity, j1 = -kInfinity;
-    for (const double x : {s.bounds.xmin, s.bounds.xmax})
-      for (const double y : {s.bounds.ymin, s.bounds.ymax}) {
-        const Point p = g.info.frame.to_lattice(x, y);
-        i0 = std::min(i0, p.x), i1 = std::max(i1, p.x), j0 = std::min(j0, p.y), j1 = std::max(j1, p.y);
-      }
-    const double side = std::ldexp(kKernelCells, level),
-                 slack = 1;  // a cell of slack is more than all rounding
-    const auto cell = [&](double v, int n) {
-      return int(std::clamp(std::floor(v / side), 0.0, double(n - 1)));
-    };
-    const int ni = g.info.shape.blocks_i(level), nj = g.info.shape.blocks_j(level);
-    return {cell(i0 - slack, ni), cell(j0 - slack, nj), cell(i1 + slack, ni), cell(j1 + slack, nj)};
-  }
-
   // Towards other grids a patch offers its kernel; a ragged one only the rectangles where it speaks with full
   // weight.
   void offer(const Grid& g, std::size_t index, int level, int bx, int by) {
@@ -197,9 +175,8 @@ class Search {
       covers_.push_back({bottom, {&g.info.frame, grown(kernel, level)}});
       return;
     }
-    const auto o = std::lower_bound(g.offers.begin(), g.offers.end(), index,
-                                    [](const Offer& a, std::size_t k) { return a.index < k; });
-    if (o == g.offers.end() || o->index != index) return;
+    const Offer* const o = g.patches.offer(index);
+    if (!o) return;
     const double step = std::ldexp(1, level), i = bx * kKernelCells * step, j = by * kKernelCells * step;
     for (std::uint32_t c = 0; c < o->count; ++c) {
       const auto& cells = o->cells[c];

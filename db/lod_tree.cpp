@@ -91,7 +91,6 @@ std::vector<LodTree::Entry> LodTree::pack(const std::vector<Entry>& entries, std
   std::vector<Tile> tiles = tiles_of(entries);
   const std::size_t pages = (entries.size() + kBulkSlots - 1) / kBulkSlots;
   std::vector<Entry> above;
-  if (level == 0) pages_.reserve(pages + pages / 16);  // without this a bulk load takes a quarter longer
   const auto done = [&](std::span<const Tile> part) {
     LodPage page(level);
     for (const Tile& t : part) page.append(entries[t.index]);
@@ -103,21 +102,15 @@ std::vector<LodTree::Entry> LodTree::pack(const std::vector<Entry>& entries, std
 }
 
 std::uint32_t LodTree::add_page(const LodPage& page) {
-  if (free_.empty()) {
-    free_.push_back(std::uint32_t(pages_.size()));
-    pages_.emplace_back();
-    if (marks_.size() < pages_.size()) marks_.push_back(0);
-  }
+  if (free_.empty()) free_.push_back(std::uint32_t(pages_.size()));
   const std::uint32_t index = free_.back();
   free_.pop_back();
-  pages_[index] = page;
-  marks_[index] = kDirty;
+  pages_.put(index, std::make_unique<LodPage>(page));
   return index;
 }
 
 void LodTree::release(std::uint32_t page) {
-  pages_[page] = LodPage();
-  marks_[page] = kFreed;
+  pages_.give_up(page);
   free_.push_back(page);
 }
 
@@ -132,24 +125,24 @@ void LodTree::insert_at(const Entry& entry, std::uint32_t level) {
   Path path;
   std::uint32_t at = root_;
   while (pages_[at].level > level) {
-    LodPage& page = pages_[at];
+    const LodPage& page = pages_[at];
+    if (path.length == kMaxHeight) refuse("its pages form a ring");
     const std::uint32_t slot = page.choose_slot(entry.box);
     const LodBox old = page.box(slot), grown = united(old, entry.box);
-    if (!(grown == old)) page.set_box(slot, grown), marks_[at] = kDirty;
+    if (!(grown == old)) pages_.change(at).set_box(slot, grown);
     path.steps[path.length++] = {at, slot};
     at = page.child(slot);
   }
   Entry pending = entry;
-  marks_[at] = kDirty;
   while (pages_[at].count == LodPage::kSlots) {
-    const LodPage part = pages_[at].split(pending);
+    const LodPage part = pages_.change(at).split(pending);
     pending = {part.bounds(), {add_page(part)}};
     if (path.length == 0) return grow_root(pending);
     const Step up = path.steps[--path.length];
-    pages_[up.page].set_box(up.slot, pages_[at].bounds());
-    marks_[at = up.page] = kDirty;
+    pages_.change(up.page).set_box(up.slot, pages_[at].bounds());
+    at = up.page;
   }
-  pages_[at].append(pending);
+  pages_.change(at).append(pending);
 }
 
 void LodTree::grow_root(const Entry& sibling) {
@@ -177,6 +170,7 @@ bool LodTree::erase(const Entry& entry) {
 // Leaves in `path` the way to the entry.
 bool LodTree::find(std::uint32_t page, const Entry& entry, Path& path) const {
   const LodPage& p = pages_[page];
+  if (path.length == kMaxHeight) refuse("its pages form a ring");
   const std::uint32_t depth = path.length++;
   for (std::uint32_t s = 0; s < p.count; ++s) {
     path.steps[depth] = {page, s};
@@ -194,15 +188,14 @@ std::vector<LodTree::Orphan> LodTree::condense(const Path& path) {
   bool take_out = true;
   for (std::uint32_t depth = path.length; depth-- > 0;) {
     const auto [index, slot] = path.steps[depth];
-    LodPage& page = pages_[index];
+    const LodPage& page = pages_[index];
     if (take_out) {
-      page.remove(slot);
+      pages_.change(index).remove(slot);
     } else {
       const LodBox tight = pages_[page.child(slot)].bounds();
       if (tight == page.box(slot)) break;
-      page.set_box(slot, tight);
+      pages_.change(index).set_box(slot, tight);
     }
-    marks_[index] = kDirty;
     take_out = depth > 0 && page.count < LodPage::kMinSlots;
     if (!take_out) continue;
     for (std::uint32_t s = 0; s < page.count; ++s) orphans.push_back({page.entry(s), page.level});
@@ -229,30 +222,14 @@ void LodTree::repack() {
   entries.reserve(size_);
   traverse([](const LodBox&) { return true; }, [&](const Entry& e) { entries.push_back(e); });
   LodTree packed = build(entries);
-  const std::size_t kept = packed.pages_.size();
-  // Pages beyond the new end are gone: whoever stores pages must hear of it once.
-  std::vector<std::uint8_t> marks(std::max(kept, marks_.size()), kFreed);
-  std::copy(packed.marks_.begin(), packed.marks_.end(), marks.begin());
+  packed.replaces(*this);
   *this = std::move(packed);
-  marks_ = std::move(marks);
 }
 
+// Every page but the root is an entry of another, so no page has to be read to know the fill.
 LodTree::Shape LodTree::shape() const {
-  Shape shape{int(pages_[root_].level) + 1, pages_.size() - free_.size(), 0};
-  std::size_t used = 0;
-  for (const LodPage& page : pages_) used += page.count;
-  shape.fill = double(used) / double(shape.nodes * LodPage::kSlots);
-  return shape;
-}
-
-std::vector<std::uint32_t> LodTree::take_marked(Mark mark) {
-  std::vector<std::uint32_t> pages;
-  for (std::size_t i = 0; i < marks_.size(); ++i) {
-    if (!(marks_[i] & mark)) continue;
-    pages.push_back(std::uint32_t(i));
-    marks_[i] = 0;
-  }
-  return pages;
+  const std::size_t nodes = pages_.size() - free_.size();
+  return {int(pages_[root_].level) + 1, nodes, double(size_ + nodes - 1) / double(nodes * LodPage::kSlots)};
 }
 
 }  // namespace patchwork

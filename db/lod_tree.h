@@ -4,10 +4,12 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "db/lazy_table.h"
 #include "db/lod_page.h"
 
 namespace patchwork {
@@ -18,6 +20,7 @@ struct VisitCost {
 };
 
 /// Keeps entries (each box sound, ids need not differ). Many may read at once; who changes it must be alone.
+/// Pages of a stored tree are read when a visit first meets them.
 class LodTree {
  public:
   static constexpr std::uint32_t kMaxHeight = 12;
@@ -28,18 +31,15 @@ class LodTree {
     std::size_t nodes = 0;  ///< pages in use
     double fill = 0;        ///< mean share of used slots
   };
-  /// A page as it was stored: its index and what `page_bytes` gave.
-  struct StoredPage {
-    std::uint32_t index;
-    std::span<const std::byte> bytes;
-  };
+  /// What `page_bytes` gave for a page; throws where it is not to be had.
+  using ReadPage = std::function<std::vector<std::byte>(std::uint32_t)>;
 
   LodTree();
   /// The same tree, page by page, for the same entries in the same order.
   static LodTree build(const std::vector<Entry>& entries);
-  /// From what `header_bytes` and `page_bytes` gave (pages in any order). Throws Error if that is no sound
-  /// tree.
-  static LodTree from_pages(std::span<const std::byte> header, std::span<const StoredPage> pages);
+  /// From what `header_bytes` and `page_bytes` gave; takes as long for a small tree as for a large one.
+  /// Throws Error if the header is none; every later call does where it meets a page that is none.
+  static LodTree open(std::span<const std::byte> header, const ReadPage& read);
 
   /// REQUIRES: entry.box.sound().
   void insert(const Entry& entry);
@@ -63,18 +63,22 @@ class LodTree {
   }
 
   /// Pages written since the last call (or since the tree began), ascending, and those given up since.
-  std::vector<std::uint32_t> take_dirty_pages() { return take_marked(kDirty); }
-  std::vector<std::uint32_t> take_freed_pages() { return take_marked(kFreed); }
+  std::vector<std::uint32_t> take_dirty_pages() { return pages_.take_changed(); }
+  std::vector<std::uint32_t> take_freed_pages() { return pages_.take_given_up(); }
+  /// This tree is to be stored over `o`: pages that only `o` has count as given up.
+  void replaces(const LodTree& o) { pages_.replaces(o.pages_); }
   /// REQUIRES: the page is in use, as those of `take_dirty_pages` are.
   std::vector<std::byte> page_bytes(std::uint32_t index) const { return pages_[index].bytes(); }
   /// Changes with every insertion and removal; the format stands in lod_tree_pages.cpp.
   std::vector<std::byte> header_bytes() const;
 
-  /// "" if every invariant holds, else what is broken first.
+  /// "" if every invariant holds, else what is broken first. Reads every page.
   std::string find_violation() const;
+  /// Pages in memory, and letting go of those that can be read again (who calls it must be alone).
+  std::size_t loaded_pages() const { return pages_.loaded(); }
+  void drop_pages() { pages_.drop_unchanged(); }
 
  private:
-  enum Mark : std::uint8_t { kDirty = 1, kFreed = 2 };
   struct Step {
     std::uint32_t page, slot;
   };
@@ -107,12 +111,11 @@ class LodTree {
   std::vector<Orphan> condense(const Path& path);
   void shrink_root();
   void repack();
-  std::vector<std::uint32_t> take_marked(Mark mark);
   std::string find_violation_below(std::uint32_t page, std::vector<bool>& seen, std::size_t& entries) const;
 
-  std::vector<LodPage> pages_;
-  std::vector<std::uint8_t>
-      marks_;  // one a page, and one for each page cut off at the end since they were taken
+  [[noreturn]] static void refuse(const std::string& problem);
+
+  LazyTable<LodPage> pages_;
   std::vector<std::uint32_t> free_;
   std::uint32_t root_ = 0;
   std::size_t size_ = 0;
@@ -127,6 +130,7 @@ VisitCost LodTree::walk(Hits hits, Emit& emit) const {
   VisitCost cost;
   std::uint32_t depth = 0;
   const auto enter = [&](const LodPage& page) {
+    if (depth == kMaxHeight) refuse("its pages form a ring");
     ++cost.nodes, cost.boxes += page.count;
     stack[depth++] = {&page, hits(page)};
   };

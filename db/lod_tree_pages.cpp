@@ -4,15 +4,15 @@
 #include "db/error.h"
 #include "db/lod_tree.h"
 
-// The header, format 1, all little-endian: u32 format, u32 root page, u32 height, u64 entries. Pages that are
-// not stored are free.
+// The header, format 2, all little-endian: u32 format, u32 root page, u32 height, u64 entries, u32 pages
+// (used and free ones), then the free ones' numbers, u32 each.
 
 namespace patchwork {
 
 namespace {
 
-constexpr std::uint64_t kFormat = 1;
-constexpr std::size_t kHeaderBytes = 20;
+constexpr std::uint64_t kFormat = 2;
+constexpr std::size_t kHeaderBytes = 24;
 
 void put(std::vector<std::byte>& out, std::uint64_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) out.push_back(std::byte(value >> 8 * i));
@@ -24,41 +24,47 @@ std::uint64_t get(std::span<const std::byte> from, std::size_t at, std::size_t b
   return value;
 }
 
-[[noreturn]] void refuse(const std::string& problem) {
-  throw Error("R-tree", problem, "run `patchwork check`, and import again if the file is damaged");
-}
-
 std::string name(std::uint32_t page) { return "page " + std::to_string(page); }
 
 }  // namespace
 
+void LodTree::refuse(const std::string& problem) {
+  throw Error("R-tree", problem, "run `patchwork check --repair`: it is made of the patches");
+}
+
 std::vector<std::byte> LodTree::header_bytes() const {
   std::vector<std::byte> out;
   put(out, kFormat, 4), put(out, root_, 4), put(out, pages_[root_].level + 1, 4), put(out, size_, 8);
+  put(out, pages_.size(), 4);
+  for (const std::uint32_t page : free_) put(out, page, 4);
   return out;
 }
 
-LodTree LodTree::from_pages(std::span<const std::byte> header, std::span<const StoredPage> pages) {
-  if (header.size() != kHeaderBytes || get(header, 0, 4) != kFormat)
+LodTree LodTree::open(std::span<const std::byte> header, const ReadPage& read) {
+  if (header.size() < kHeaderBytes || header.size() % 4 || get(header, 0, 4) != kFormat)
     refuse("its header has an unknown format");
   LodTree tree;
-  tree.pages_.clear(), tree.marks_.clear();
-  for (const StoredPage& stored : pages) {
-    if (stored.index >= most_pages(pages.size())) refuse(name(stored.index) + " has too high a number");
-    if (stored.index >= tree.pages_.size()) tree.pages_.resize(stored.index + std::size_t{1});
-    if (tree.pages_[stored.index].level != LodPage::kFree) refuse(name(stored.index) + " is stored twice");
-    std::string problem;
-    tree.pages_[stored.index] = LodPage::from_bytes(stored.bytes, problem);
-    if (!problem.empty()) refuse(name(stored.index) + " " + problem);
+  const std::size_t size = get(header, 20, 4), free = (header.size() - kHeaderBytes) / 4;
+  tree.root_ = std::uint32_t(get(header, 4, 4)), tree.size_ = std::size_t(get(header, 12, 8));
+  if (free >= size || size > most_pages(size - free) || size - free > tree.size_ + 1)
+    refuse("its header states an impossible size");
+  if (tree.root_ >= size) refuse("the root is no page");
+  tree.free_.clear();
+  for (std::size_t at = kHeaderBytes; at < header.size(); at += 4) {
+    tree.free_.push_back(std::uint32_t(get(header, at, 4)));
+    if (tree.free_.back() >= size) refuse("its header names a free page that is none");
   }
-  for (std::size_t i = tree.pages_.size(); i-- > 0;)
-    if (tree.pages_[i].level == LodPage::kFree) tree.free_.push_back(std::uint32_t(i));
-  tree.marks_.resize(tree.pages_.size());
-  tree.root_ = std::uint32_t(get(header, 4, 4));
-  tree.size_ = std::size_t(get(header, 12, 8));
-  const std::string violation = tree.find_violation();
-  if (!violation.empty()) refuse(violation);
-  if (get(header, 8, 4) != tree.pages_[tree.root_].level + 1) refuse("its header states another height");
+  const auto height = std::uint32_t(get(header, 8, 4));
+  tree.pages_ = LazyTable<LodPage>(size, [read, height, size](std::size_t index) {
+    std::string problem;
+    auto page = std::make_unique<LodPage>(LodPage::from_bytes(read(std::uint32_t(index)), problem));
+    if (problem.empty() && page->level >= height) problem = "has another level than its place";
+    for (std::uint32_t s = 0; problem.empty() && page->level > 0 && s < page->count; ++s)
+      if (page->ref[s] >= size) problem = "refers to a page that is none";
+    if (!problem.empty()) refuse(name(std::uint32_t(index)) + " " + problem);
+    return page;
+  });
+  if (height != tree.pages_[tree.root_].level + 1) refuse("its header states another height");
   return tree;
 }
 
@@ -67,8 +73,7 @@ std::string LodTree::find_violation() const {
   if (pages_.size() > most_pages(pages_.size() - free_.size())) return "too few of its pages are in use";
   std::vector<bool> seen(pages_.size());
   for (const std::uint32_t page : free_) {
-    if (seen[page] || pages_[page].level != LodPage::kFree)
-      return name(page) + " is free, but in use or free twice";
+    if (seen[page]) return name(page) + " is free twice";
     seen[page] = true;
   }
   if (seen[root_]) return "the root is free";

@@ -34,6 +34,11 @@ class LruCache {
     return made;
   }
 
+  void clear() {
+    const std::lock_guard lock(mutex_);
+    places_.clear(), items_.clear(), used_ = 0;
+  }
+
  private:
   struct Item {
     Key key;

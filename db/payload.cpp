@@ -46,7 +46,7 @@ std::string decode_chunk(std::span<const std::byte> bytes, Chunk& chunk) {
   if (std::string bad = decode_codes(rest.subspan(length), chunk.cols, chunk.rows, cells); !bad.empty())
     return bad;
   for (const std::int32_t c : cells) {
-    if (c < 0 || c > 7) return "a payload with an impossible cell mask";
+    if (c < 0 || c > 15) return "a payload with an impossible cell mask";
     chunk.cells.push_back(std::uint8_t(c));
   }
   return "";

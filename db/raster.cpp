@@ -23,6 +23,8 @@ struct Facts {
   double accuracy = 0, scale = 1, offset = 0;  // accuracy: as claimed
   CostField cost;                              // of a warp, raw units
   int sample_bytes = 1;
+  std::string sample_type;
+  std::optional<double> nodata;
   std::vector<std::string> warnings;
   std::unique_ptr<raster_impl::Rows> rows;
 };
@@ -60,6 +62,8 @@ Facts describe(const RawGrid& raw) {
   f.scale = raw.scale;
   f.offset = raw.offset;
   f.sample_bytes = GDALGetDataTypeSizeBytes(raw.type);
+  f.sample_type = GDALGetDataTypeName(raw.type);
+  if (!raw.nodata.empty()) f.nodata = raw.nodata.front();
   f.warnings = raw.warnings;
   return f;
 }
@@ -74,6 +78,7 @@ void warp_into(Facts& f, RawGrid& raw, const OGRSpatialReference& target) {
                        size_text(warped.width, warped.height) + " samples; up to " + metres_up(cost) +
                        " added to its accuracy, by place");
   f.integer_samples = f.float_is_exact = false;
+  f.sample_type = GDALGetDataTypeName(GDT_Float64), f.nodata.reset();
   f.width = warped.width;
   f.height = warped.height;
   raw.geotransform = warped.geotransform;
@@ -149,6 +154,8 @@ double RasterSource::scale() const { return impl_->scale; }
 double RasterSource::offset() const { return impl_->offset; }
 const std::vector<std::string>& RasterSource::warnings() const { return impl_->warnings; }
 int RasterSource::sample_bytes() const { return impl_->sample_bytes; }
+const std::string& RasterSource::sample_type() const { return impl_->sample_type; }
+std::optional<double> RasterSource::nodata() const { return impl_->nodata; }
 bool RasterSource::float_is_exact() const { return impl_->float_is_exact; }
 
 void RasterSource::read_rows(int row, int rows, std::span<double> out) const {

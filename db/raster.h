@@ -62,6 +62,10 @@ class RasterSource {
   const std::vector<std::string>& warnings() const;
   /// Bytes of one raw sample in the file (1 to 8): what the database's size is compared with.
   int sample_bytes() const;
+  /// GDAL's name of the raw samples' type ("Float64" after a warp), and the first value declared or given as
+  /// no data.
+  const std::string& sample_type() const;
+  std::optional<double> nodata() const;
   /// True: every raw sample is a float exactly, so the cheaper read_rows into floats loses nothing.
   bool float_is_exact() const;
 

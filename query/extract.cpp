@@ -17,6 +17,14 @@ struct Found {
   PatchId id;
 };
 
+// The bound where the patch speaks: beyond the outer samples of its grid it is larger.
+double bound_of(const Found& f) {
+  const GridShape& shape = f.grid->info.shape;
+  const LatticeRect d = shape.domain(f.id.level(), f.id.bx(), f.id.by());
+  const bool beyond = d.i0 < 0 || d.j0 < 0 || d.i1 > shape.width() - 1 || d.j1 > shape.height() - 1;
+  return beyond ? f.bottom + f.grid->info.rim_error : f.bottom;
+}
+
 // By bottom; ties by the order, the greater first.
 void sort_by_priority(std::vector<Found>& found) {
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
@@ -33,6 +41,7 @@ Extraction extract(const Database& db, const UniformCut& cut) {
   const auto start = std::chrono::steady_clock::now();
   Extraction result;
   std::vector<Found> found;
+  const Database::Reading reading = db.reading();
   const VisitCost visited =
       db.tree().visit_uniform(cut.region.bounds(), cut.error, [&](const LodTree::Entry& e) {
         const Grid& grid = db.grid(e.id.grid());
@@ -45,9 +54,12 @@ Extraction extract(const Database& db, const UniformCut& cut) {
           found.push_back({bottom, &grid, index, e.id});
       });
   sort_by_priority(found);
-  for (const Found& f : found) result.patches.push_back(f.id);
+  for (const Found& f : found) {
+    result.patches.push_back(f.id);
+    result.bound_max = std::max(result.bound_max, bound_of(f));
+  }
+  if (cut.strict) result.bound_max = std::min(result.bound_max, cut.error);
   result.error_available = found.empty() ? 0 : found.front().bottom;
-  result.bound_max = found.empty() ? 0 : found.back().bottom;
   const std::size_t bytes = found.size() * sizeof(PatchSurface::codes);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   result.cost = {visited.nodes, visited.boxes, found.size(), bytes, seconds.count()};

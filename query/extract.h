@@ -27,8 +27,8 @@ struct Cost {
 struct Extraction {
   std::vector<PatchId> patches;  ///< by bottom, then by the order of the model (the greater first)
   Cost cost;
-  double bound_max = 0;        ///< metres: the largest bottom among them
-  double error_available = 0;  ///< metres: the smallest
+  double bound_max = 0;  ///< metres: the largest that they give (k = 0), half cells beyond samples included
+  double error_available = 0;  ///< metres: the smallest bottom among them
 };
 
 /// Throws Error: error negative or not a number.

@@ -26,6 +26,9 @@ struct Common {
 
 /// A verb: adds its subcommand; the callback that it sets does the work and throws Error.
 void add_import(CLI::App& app, Common& common);
+void add_remove(CLI::App& app, Common& common);
+void add_export(CLI::App& app, Common& common);
+void add_check(CLI::App& app, Common& common);
 void add_list(CLI::App& app, Common& common);
 void add_info(CLI::App& app, Common& common);
 void add_query(CLI::App& app, Common& common);

@@ -36,6 +36,9 @@ int main(int argc, char** argv) {
   cli::Common common;
   std::unique_ptr<tbb::global_control> threads;
   cli::add_import(app, common);
+  cli::add_remove(app, common);
+  cli::add_export(app, common);
+  cli::add_check(app, common);
   cli::add_list(app, common);
   cli::add_info(app, common);
   cli::add_query(app, common);

@@ -83,7 +83,7 @@ void Resampler::evaluate(int factor, int row, int rows, std::span<float* const> 
       if (bands_[b] == "height")  // asked for twice
         std::copy(out.height32.begin() + long(from), out.height32.begin() + long(to), f + from);
       if (bands_[b] == "source")
-        std::copy(source_.begin() + long(from), source_.begin() + long(to), f + from);
+        for (std::size_t k = from; k < to; ++k) f[k] = source_[k] ? float(source_[k]) : NAN;
       // A bound is rounded up, or it would not be one.
       if (bands_[b] == "bound")
         for (std::size_t k = from; k < to; ++k) {

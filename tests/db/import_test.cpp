@@ -248,8 +248,9 @@ TEST(DegenerateGrids, MirroredAxesAndAnyStepKeepSamplesAndExtent) {
       EXPECT_NEAR(e.xmin, 1000 + std::min(0.0, 70 * sx), 1e-9 * 1e8);
       EXPECT_NEAR(e.xmax - e.xmin, 70 * std::abs(sx), 1e-10 + 1e-12 * 7e7);
       EXPECT_NEAR(e.ymax - e.ymin, 45 * std::abs(sy), 1e-10 + 1e-12 * 7e7);
-      for (const PatchRecord& p : g.patches)
+      g.patches.each([&](std::size_t, const PatchRecord& p) {
         EXPECT_TRUE(std::isfinite(p.bottom) && p.bottom >= file.accuracy && p.exists());
+      });
     }
 }
 

@@ -10,94 +10,16 @@
 #include <set>
 
 #include "tests/db/databases.h"
+#include "tests/db/model.h"
 #include "tests/grids.h"
 #include "tests/seed.h"
 
 namespace patchwork {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 double rough(double x, double y) {
   return 40 * std::sin(x / 170) * std::cos(y / 130) + 5 * std::sin(x / 21 + y / 37) +
          0.3 * std::sin(x * 1.7 + y);
-}
-
-struct Candidate {
-  double bottom;
-  std::vector<OrientedRect> rects;
-};
-
-LatticeRect grown(LatticeRect r, int level) {
-  const double by = std::ldexp(1.0 / 1024, level);
-  return {r.i0 - by, r.j0 - by, r.i1 + by, r.j1 + by};
-}
-
-// What patch k of `g` covers: its kernel towards its own grid, towards others only what it offers.
-std::vector<OrientedRect> cover_of(const Grid& g, std::size_t k, bool own) {
-  const GridShape::Block b = g.info.shape.block(k);
-  const LatticeRect kernel = g.info.shape.kernel(b.level, b.bx, b.by);
-  if (own || !g.patches[k].ragged()) return {{&g.info.frame, grown(kernel, b.level)}};
-  std::vector<OrientedRect> rects;
-  for (const Offer& o : g.offers)
-    for (std::uint32_t c = 0; o.index == k && c < o.count; ++c) {
-      const double step = std::ldexp(1, b.level), i = b.bx * kKernelCells * step,
-                   j = b.by * kKernelCells * step;
-      const auto& [i0, j0, i1, j1] = o.cells[c];
-      const LatticeRect r{std::max(kernel.i0, i + i0 * step), std::max(kernel.j0, j + j0 * step),
-                          std::min(kernel.i1, i + i1 * step), std::min(kernel.j1, j + j1 * step)};
-      if (!r.empty()) rects.push_back({&g.info.frame, grown(r, b.level)});
-    }
-  return rects;
-}
-
-/// min { z : kernel(p) is covered by the candidates with bottom <= z }.
-double smallest_z(std::span<const Grid> grids, PatchPlace p, std::vector<Candidate> candidates) {
-  const Grid& g = grids[p.grid];
-  const GridShape::Block b = g.info.shape.block(p.index);
-  const OrientedRect target{&g.info.frame, g.info.shape.kernel(b.level, b.bx, b.by)};
-  std::sort(candidates.begin(), candidates.end(),
-            [](const Candidate& x, const Candidate& y) { return x.bottom < y.bottom; });
-  std::vector<OrientedRect> rects;
-  CoverageCounts counts;
-  for (const Candidate& c : candidates) {
-    rects.insert(rects.end(), c.rects.begin(), c.rects.end());
-    if (covered(target, rects, counts)) return c.bottom;
-  }
-  return kInfinity;
-}
-
-template <class Admit>
-std::vector<Candidate> candidates(std::span<const Grid> grids, PatchPlace p, Admit admit) {
-  std::vector<Candidate> all;
-  for (std::size_t g = 0; g < grids.size(); ++g)
-    each_patch(grids[g], [&](std::size_t k, auto) {
-      if (g == p.grid && k == p.index) return;
-      if (admit(grids[g], k)) all.push_back({grids[g].patches[k].bottom, cover_of(grids[g], k, g == p.grid)});
-    });
-  return all;
-}
-
-double brute_top(std::span<const Grid> grids, PatchPlace p, bool by_order = true) {
-  CoverageCounts counts;
-  return smallest_z(grids, p, candidates(grids, p, [&](const Grid& g, std::size_t k) {
-                      return !by_order || less(grids[p.grid], p.index, g, k, counts);
-                    }));
-}
-
-bool brute_best(std::span<const Grid> grids, PatchPlace p) {
-  CoverageCounts counts;
-  const Grid& own = grids[p.grid];
-  const double bottom = own.patches[p.index].bottom;
-  auto better = candidates(grids, p, [&](const Grid& g, std::size_t k) {
-    const double z = g.patches[k].bottom;
-    return z < bottom || (z == bottom && less(own, p.index, g, k, counts));
-  });
-  // Where a finer block of the own grid is absent its cells hold no data: to know that is better.
-  for (std::size_t k = 0; k < own.patches.size(); ++k)
-    if (!own.patches[k].exists() && own.info.shape.block(k).level < own.info.shape.block(p.index).level)
-      better.push_back({0, cover_of(own, k, true)});
-  return smallest_z(grids, p, better) == kInfinity;
 }
 
 // A few small grids at any angle over each other, some with holes.
@@ -132,12 +54,12 @@ TEST(Invariant, AgreesWithTheFormulasOfTheModel) {
     for (std::size_t g = 0; g < db.grids().size(); ++g)
       each_patch(db.grids()[g], [&](std::size_t k, GridShape::Block b) {
         const PatchRecord& p = db.grids()[g].patches[k];
-        EXPECT_EQ(p.top, brute_top(db.grids(), {g, k}))
+        EXPECT_EQ(p.top, model::top(db.grids(), {g, k}))
             << g << ": " << b.level << ", " << b.bx << ", " << b.by;
-        EXPECT_EQ(p.best(), brute_best(db.grids(), {g, k}))
+        EXPECT_EQ(p.best(), model::best(db.grids(), {g, k}))
             << g << ": " << b.level << ", " << b.bx << ", " << b.by;
-        finite += p.top < kInfinity, dormant += p.dormant(), not_best += !p.best();
-        other_without_order += p.top != brute_top(db.grids(), {g, k}, false);
+        finite += p.top < model::kInfinity, dormant += p.dormant(), not_best += !p.best();
+        other_without_order += p.top != model::top(db.grids(), {g, k}, false);
       });
   }
   EXPECT_GT(finite, 0);
@@ -149,7 +71,7 @@ TEST(Invariant, AgreesWithTheFormulasOfTheModel) {
 // Does a patch answer at a point of the lattice? `hairline`: the point is too near to its rim to say.
 bool answers(const Database& db, const Grid& g, std::size_t k, Point at, bool& hairline) {
   const GridShape::Block b = g.info.shape.block(k);
-  const LatticeRect r = g.info.shape.kernel(b.level, b.bx, b.by), outer = grown(r, b.level);
+  const LatticeRect r = g.info.shape.kernel(b.level, b.bx, b.by), outer = model::grown(r, b.level);
   const auto in = [&](const LatticeRect& q) {
     return at.x >= q.i0 && at.x <= q.i1 && at.y >= q.j0 && at.y <= q.j1;
   };

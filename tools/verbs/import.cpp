@@ -14,7 +14,8 @@ namespace patchwork::cli {
 namespace {
 
 struct Options {
-  std::string database, name, crs;
+  std::string database, name, crs, replace;
+  double tolerance = 0;
   std::vector<std::string> files;
   RasterOptions raster;
   bool join = false, dry_run = false;
@@ -51,6 +52,8 @@ Json json_of(const ImportReport& r, const std::vector<std::string>& warnings,
          {"dormant", r.dormant},
          {"hidden", r.hidden},
          {"lowered", r.lowered},
+         {"removed", r.removed},
+         {"woken", r.woken},
          {"quantisation", r.quantisation},
          {"extent", to_json(r.extent)}};
   g["stages"] = {{"read", r.seconds.scan},
@@ -92,8 +95,11 @@ class ImportRun {
       : o_(options), common_(common), guard_(options.database) {}
 
   void run() {
-    if (!o_.name.empty() && o_.files.size() > 1 && !o_.join)
+    const bool one_grid = o_.files.size() == 1 || o_.join;
+    if (!o_.name.empty() && !one_grid)
       throw CLI::ValidationError("--name", "it can name one grid only; give one file or --join");
+    if (!o_.replace.empty() && !one_grid)
+      throw CLI::ValidationError("--replace", "one grid takes the place of one; give one file or --join");
     std::vector<std::vector<std::string>> sets;
     if (o_.join)
       sets.push_back(o_.files);
@@ -125,12 +131,15 @@ class ImportRun {
     opened_ = true;
     std::optional<Comparison> compared;
     if (o_.dry_run) compared = compare(*db, source);
-    const std::string name = o_.name.empty() ? std::filesystem::path(files.front()).stem().string() : o_.name;
+    const std::string stem = std::filesystem::path(files.front()).stem().string();
+    const std::string name = !o_.name.empty() ? o_.name : !o_.replace.empty() ? o_.replace : stem;
     const double megasamples = double(source.width()) * source.height() / 1e6;
     ProgressBar bar(common_, "import " + name, megasamples, "Msamples");
     const ImportReport report = db->import(source, {.name = name,
                                                     .memory = common_.memory,
                                                     .dry_run = o_.dry_run,
+                                                    .tolerance = o_.tolerance,
+                                                    .replace = o_.replace,
                                                     .progress = [&](double share) { bar.show(share); }});
     if (!o_.dry_run) guard_.keep();
     if (!common_.json && !common_.quiet) fmt::print("{}\n", text_of(report, o_.dry_run, compared));
@@ -151,7 +160,12 @@ void add_import(CLI::App& app, Common& common) {
   v->add_option("DB", o->database, "the database; made if it is not there")->required();
   v->add_option("FILE", o->files, "height grids in any format that GDAL reads")->required();
   v->add_option("--accuracy", o->raster.accuracy, "largest error of the grid's surface, metres");
-  v->add_option("--name", o->name, "of the grid; else the file's name without its ending");
+  v->add_option("--name", o->name,
+                "of the grid; else that of the grid it replaces, else the file's name without its ending");
+  v->add_option("--replace", o->replace, "a grid of the database that goes out as this one comes in");
+  v->add_option("--tolerance", o->tolerance,
+                "metres by which a stored height may differ from the file's; 0 keeps them exactly")
+      ->check(CLI::NonNegativeNumber);
   v->add_option("--crs", o->crs, "CRS of a new database, e.g. EPSG:32610; projected, in metres");
   v->add_option("--band", o->raster.band, "band that holds the heights, from 1");
   v->add_option("--nodata", o->raster.nodata, "a further value that means no data (may be repeated)")

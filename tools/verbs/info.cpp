@@ -53,14 +53,13 @@ Json describe(const Database& db) {
   std::vector<std::size_t> by_level;
   double smallest = 0;
   for (const Grid& g : db.grids())
-    for (std::size_t k = 0; k < g.patches.size(); ++k) {
-      const PatchRecord& p = g.patches[k];
-      if (!p.exists()) continue;
+    g.patches.each([&](std::size_t k, const PatchRecord& p) {
+      if (!p.exists()) return;
       const auto level = size_t(g.info.shape.block(k).level);
       if (by_level.size() <= level) by_level.resize(level + 1);
       smallest = patches == 0 ? p.bottom : std::min(smallest, p.bottom);
       ++patches, ++by_level[level], dormant += p.dormant();
-    }
+    });
   Json levels = Json::object();
   for (std::size_t l = 0; l < by_level.size(); ++l) levels[std::to_string(l)] = by_level[l];
   const LodTree::Shape shape = db.tree().shape();

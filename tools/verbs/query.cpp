@@ -16,7 +16,7 @@ struct Options {
 
 Json json_of(const Database& db, PatchId id) {
   const Grid& g = db.grid(id.grid());
-  const PatchRecord& p = db.patch(id);
+  const PatchRecord p = db.patch(id);
   const LatticeRect k = g.info.shape.kernel(id.level(), id.bx(), id.by());
   const Point c = g.info.frame.to_domain(0.5 * (k.i0 + k.i1), 0.5 * (k.j0 + k.j1));
   return {{"grid", g.info.name},

@@ -118,12 +118,18 @@ void refuse_same_file(const std::string& out, const std::string& database) {
     throw Error(out, "it is the database itself", "write to another file");
 }
 
+// An extent is rounded outward by a hair; a raster whose pixels are to meet a grid's samples must not be.
+Extent to_micrometres(const Extent& e) {
+  const auto round = [](double v) { return std::nearbyint(v * 1e6) / 1e6; };
+  return {round(e.xmin), round(e.ymin), round(e.xmax), round(e.ymax)};
+}
+
 void run(const Options& o, const Common& common) {
   const auto start = std::chrono::steady_clock::now();
   const Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
   for (const std::string& out : {o.out, o.hillshade, o.map}) refuse_same_file(out, o.database);
-  const Extent extent = o.region.extent.empty() ? db.extent() : o.region.region().bounds();
+  const Extent extent = o.region.extent.empty() ? to_micrometres(db.extent()) : o.region.region().bounds();
   const Raster raster = Raster::covering(extent, o.step > 0 ? o.step : finest_step(db, extent));
   const double open_seconds = seconds_since(start);
   const Extraction x = extract(db, {.error = o.surface.error, .region = Region::inside(extent)});

@@ -1,0 +1,294 @@
+// Grids come and go: whatever the way, the database is the one that its grids alone make.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+#include <random>
+#include <set>
+
+#include "db/database.h"
+#include "tests/db/databases.h"
+#include "tests/db/model.h"
+#include "tests/grids.h"
+#include "tests/seed.h"
+
+namespace patchwork {
+namespace {
+
+double rough(double x, double y) {
+  return 40 * std::sin(x / 170) * std::cos(y / 130) + 5 * std::sin(x / 21 + y / 37) + std::sin(x * 1.7 + y);
+}
+
+// Small surveys at any angle over each other, some with holes, two of equal frame.
+std::vector<GridFile> surveys(int n, std::mt19937_64& random) {
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  std::vector<GridFile> files;
+  for (int k = 0; k < n; ++k) {
+    GridFile file{.width = 20 + int(random() % 50), .height = 20 + int(random() % 40)};
+    const double step = uniform(4, 10);
+    file.geotransform =
+        rotated(uniform(-150, 150), uniform(200, 500), k % 2 ? uniform(-180, 180) : 0, step, step);
+    if (k == 3) file = files[2];
+    file.accuracy = uniform(0.1, 3);
+    file.pixel_is_area = random() % 2;
+    const double lift = k;
+    file = of_terrain(file, [lift](double x, double y) { return rough(x, y) + lift; });
+    if (k % 3 == 1)
+      file.at = [at = file.at, w = file.width](int i, int j) {
+        return i < w / 3 && j > 8 ? kHole : at(i, j);
+      };
+    files.push_back(file);
+  }
+  return files;
+}
+
+// What the model says of a set of grids, evaluated once a set: by name and place of the patch.
+struct Expected {
+  std::map<std::pair<std::string, std::size_t>, Standing> standings;
+  std::string hash;
+};
+
+class Trial {
+ public:
+  Trial(std::uint64_t seed, int grids) : random_(seed), files_(surveys(grids, random_)) {
+    for (std::size_t k = 0; k < files_.size(); ++k) sources_.push_back(folder_.source(files_[k], name(k)));
+    db_.emplace(folder_.database());
+  }
+
+  void step() {
+    const auto kind = random_() % 8;
+    const std::size_t k = random_() % sources_.size();
+    if (kind == 0) {
+      db_.reset();
+      db_.emplace(random_() % 2 ? Database::open_existing(folder_.path("grids.patchwork"), 1 << 12)
+                                : folder_.database());
+    } else if (kind == 1 && !in_.empty() && !in_.contains(k)) {
+      const std::size_t out = *std::next(in_.begin(), std::ptrdiff_t(random_() % in_.size()));
+      db_->import(sources_[k], {.name = name(k), .replace = name(out)});
+      in_.erase(out), in_.insert(k);
+    } else if (kind < 5) {
+      in_.contains(k) ? void(db_->remove(name(k))) : void(db_->import(sources_[k], {.name = name(k)}));
+      if (!in_.insert(k).second) in_.erase(k);
+    }
+  }
+
+  // Every record, the tree and the hash are those of the set; a query finds what a scan does.
+  void expect_as_modelled() {
+    const Expected& expected = of_set();
+    std::size_t patches = 0;
+    for (const Grid& g : db_->grids())
+      each_patch(g, [&](std::size_t k, auto) {
+        ++patches;
+        const auto at = expected.standings.find({g.info.name, k});
+        ASSERT_NE(at, expected.standings.end());
+        EXPECT_EQ(g.patches[k].top, at->second.top) << g.info.name << " " << k;
+        EXPECT_EQ(g.patches[k].best(), at->second.best) << g.info.name << " " << k;
+      });
+    EXPECT_EQ(patches, expected.standings.size());
+    EXPECT_EQ(db_->content_hash(), expected.hash);
+    EXPECT_EQ(db_->tree().find_violation(), "");
+    expect_query();
+  }
+  const std::set<std::size_t>& in() const { return in_; }
+  Database& db() { return *db_; }
+  std::size_t sets() const { return known_.size(); }
+
+ private:
+  static std::string name(std::size_t k) { return fmt::format("g{}", k); }
+
+  void expect_query() {
+    const auto uniform = [&](double a, double b) {
+      return std::uniform_real_distribution<double>(a, b)(random_);
+    };
+    const double x = uniform(-200, 400), y = uniform(-200, 400), side = uniform(1, 400);
+    const Extent region{x, y, x + side, y + side};
+    const double error = std::exp(uniform(-3, 4));
+    std::set<PatchId> found, scanned;
+    db_->tree().visit_uniform(region, error, [&](const LodEntry& e) { found.insert(e.id); });
+    for (const Grid& g : db_->grids())
+      each_patch(g, [&](std::size_t k, auto) {
+        const LodBox b = lod_box(g, k);
+        const bool meets = Extent{b.xmin, b.ymin, b.xmax, b.ymax}.meets(region);
+        if (!g.patches[k].dormant() && meets && b.bottom <= error && error < b.top)
+          scanned.insert(g.patch_id(k));
+      });
+    EXPECT_EQ(found, scanned);
+  }
+
+  const Expected& of_set() {
+    const auto [at, is_new] = known_.try_emplace(in_);
+    if (!is_new) return at->second;
+    Expected& e = at->second;
+    for (std::size_t g = 0; g < db_->grids().size(); ++g)
+      each_patch(db_->grids()[g], [&](std::size_t k, auto) {
+        e.standings[{db_->grids()[g].info.name, k}] = {model::top(db_->grids(), {g, k}),
+                                                       model::best(db_->grids(), {g, k})};
+      });
+    // The reference database never saw any other grid.
+    const std::string fresh = fmt::format("fresh{}", known_.size());
+    Database db = folder_.database(fresh);
+    for (const std::size_t k : in_) db.import(sources_[k], {.name = name(k)});
+    e.hash = db.content_hash();
+    return e;
+  }
+
+  GridFolder folder_;
+  std::mt19937_64 random_;
+  std::vector<GridFile> files_;
+  std::vector<RasterSource> sources_;
+  std::optional<Database> db_;
+  std::set<std::size_t> in_;
+  std::map<std::set<std::size_t>, Expected> known_;
+};
+
+int trials(int standard) {
+  const char* given = std::getenv("PATCHWORK_TRIALS");
+  return given ? std::atoi(given) : standard;
+}
+
+// PATCHWORK_TRIALS=2000 takes as many steps as the design asks for.
+TEST(Change, RandomInsertsRemovalsAndReopeningsAgreeWithTheModelAfterEveryStep) {
+  Trial trial(test_seed(1), 7);
+  std::size_t most = 0;
+  for (int n = 0; n < trials(400) && !testing::Test::HasFailure(); ++n) {
+    trial.step();
+    trial.expect_as_modelled();
+    most = std::max(most, trial.in().size());
+    if (n % 50 == 0) {
+      EXPECT_TRUE(trial.db().check().empty());
+    }
+  }
+  EXPECT_GE(most, 4u);
+  EXPECT_GT(trial.sets(), 20u);
+}
+
+TEST(InsertRemove, GivesBackTheDatabaseThatNeverSawTheGrid) {
+  const GridFolder folder;
+  std::mt19937_64 random(test_seed(2));
+  std::vector<GridFile> files = surveys(5, random);
+  files[3] = files[2], files[3].accuracy = 0.01;  // the same survey, better known
+  Database db = folder.database(), never = folder.database("never");
+  for (std::size_t k = 0; k < 3; ++k) {
+    folder.add(db, files[k], fmt::format("g{}", k));
+    folder.add(never, files[k], fmt::format("g{}", k));
+  }
+  const ImportReport first = folder.add(db, files[3], "guest");
+  folder.add(db, files[4], "other guest");
+  EXPECT_NE(db.content_hash(), never.content_hash()) << "negative control: the guests change it";
+  EXPECT_GT(first.lowered, 0u);
+  const RemoveReport gone = db.remove("guest");
+  EXPECT_EQ(gone.patches, first.patches);
+  db.remove("other guest");
+  EXPECT_EQ(db.content_hash(), never.content_hash());
+  EXPECT_TRUE(db.check().empty());
+}
+
+TEST(InsertRemove, DormantPatchesWakeUp) {
+  const GridFolder folder;
+  Database db = folder.database();
+  GridFile file = of_terrain({.width = 120, .height = 100, .accuracy = 4}, rough);
+  folder.add(db, file, "old");
+  const std::size_t live = count_live(db);
+  file.accuracy = 0.5;
+  const ImportReport better = folder.add(db, file, "new");
+  EXPECT_EQ(better.hidden, live);
+  const RemoveReport gone = db.remove("new");
+  EXPECT_EQ(gone.woken, live);
+  EXPECT_EQ(count_live(db), live);
+}
+
+TEST(InsertRemove, TheLastGridLeavesAnEmptySoundDatabase) {
+  const GridFolder folder;
+  Database db = folder.database();
+  const std::string empty = db.content_hash();
+  folder.add(db, heights("1 2 / 3 4"), "only");
+  db.remove("only");
+  EXPECT_EQ(db.content_hash(), empty);
+  EXPECT_TRUE(db.grids().empty());
+  EXPECT_EQ(db.tree().size(), 0u);
+  EXPECT_TRUE(Database::open(db.path()).check().empty());
+}
+
+TEST(InsertRemove, ANameThatIsNotThereIsRefused) {
+  const GridFolder folder;
+  Database db = folder.database();
+  folder.add(db, heights("1 2 / 3 4"), "only");
+  EXPECT_NE(refusal_of([&] { db.remove("other"); }).find("no grid named other"), std::string::npos);
+  EXPECT_NE(refusal_of([&] {
+              folder.add(db, heights("1 2 / 3 5"), "x", {.replace = "other"});
+            }).find("no grid named other"),
+            std::string::npos);
+  EXPECT_EQ(db.grids().size(), 1u);
+}
+
+TEST(Replace, IsRemovalAndImportInOneChange) {
+  const GridFolder folder;
+  std::mt19937_64 random(test_seed(3));
+  const std::vector<GridFile> files = surveys(3, random);
+  Database db = folder.database(), other = folder.database("other");
+  folder.add(db, files[0], "base"), folder.add(other, files[0], "base");
+  folder.add(db, files[1], "survey");
+  const std::uint64_t before = db.version();
+  const ImportReport r = folder.add(db, files[2], "survey", {.replace = "survey"});
+  folder.add(other, files[2], "survey");
+  EXPECT_EQ(db.version(), before + 1) << "no reader sees it without the survey";
+  EXPECT_GT(r.removed, 0u);
+  EXPECT_EQ(db.content_hash(), other.content_hash());
+  EXPECT_TRUE(db.check().empty());
+  // The next grid may get the number of the one that left; its heights must be its own.
+  EXPECT_EQ(different_surfaces(db, grid_named(db, "survey"), other, grid_named(other, "survey")), 0);
+}
+
+TEST(ReadSamples, GivesBackTheFilesSamplesToTheLastBit) {
+  for (const GDALDataType type : {GDT_Int16, GDT_Float32}) {
+    const GridFolder folder;
+    Database db = folder.database();
+    GridFile file = of_terrain({.width = 150, .height = 131, .type = type}, rough);
+    file.at = [at = file.at, type](int i, int j) {
+      if ((i > 30 && i < 60 && j > 40) || (i % 7 == 0 && j % 5 == 0)) return kHole;
+      return type == GDT_Int16 ? std::round(at(i, j))
+                               : double(float(std::ldexp(std::round(at(i, j) * 256), -8)));
+    };
+    if (type == GDT_Int16) file.nodata = -999;
+    // A sample alone in a hole: it is in no cell with data.
+    file.at = [at = file.at](int i, int j) { return i == 45 && j == 80 ? 7.0 : at(i, j); };
+    folder.add(db, file, "grid");
+    std::vector<double> row(150);
+    int wrong = 0, holes = 0;
+    for (int j = 0; j < file.height; ++j) {
+      db.read_samples(db.grids()[0].info.id, j, 1, row);
+      for (int i = 0; i < file.width; ++i) {
+        const double h = file.at(i, j), got = row[size_t(i)];
+        holes += std::isnan(h), wrong += !(got == h || (std::isnan(got) && std::isnan(h)));
+      }
+    }
+    EXPECT_EQ(wrong, 0);
+    EXPECT_GT(holes, 1000);
+  }
+}
+
+TEST(Tolerance, EntersTheBoundAndIsKept) {
+  const GridFolder folder;
+  Database db = folder.database(), exact = folder.database("exact");
+  const GridFile file = of_terrain({.width = 150, .height = 131, .accuracy = 0.2}, rough);
+  const ImportReport r = folder.add(db, file, "grid", {.tolerance = 0.3});
+  folder.add(exact, file, "grid");
+  EXPECT_EQ(r.quantisation, 0.3);
+  EXPECT_EQ(grid_named(db, "grid").at(0, 0, 0).error[0], 0.5);
+  EXPECT_LT(db.file_bytes(), exact.file_bytes());
+  std::vector<double> row(150);
+  double most = 0;
+  for (int j = 0; j < file.height; ++j) {
+    db.read_samples(db.grids()[0].info.id, j, 1, row);
+    for (int i = 0; i < file.width; ++i)
+      most = std::max(most, std::abs(row[size_t(i)] - double(float(file.at(i, j)))));
+  }
+  EXPECT_LE(most, 0.3);
+  EXPECT_GT(most, 0.25);
+}
+
+}  // namespace
+}  // namespace patchwork

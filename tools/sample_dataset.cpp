@@ -1,0 +1,147 @@
+#include "tools/sample_dataset.h"
+
+#include <gdal_priv.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <vector>
+
+#include "db/error.h"
+#include "tools/unfinished_files.h"
+
+namespace patchwork {
+
+namespace {
+
+constexpr int kRows = 256;
+
+struct Range {
+  double low = INFINITY, high = -INFINITY;
+  bool holes = false;
+};
+
+class SampleWriter {
+ public:
+  SampleWriter(const Database& db, const GridInfo& grid, const std::function<void(double)>& progress)
+      : db_(db), grid_(grid), progress_(progress) {}
+
+  std::string write(const std::string& path) {
+    GDALAllRegister();
+    each_strip(0, [&](int, std::span<const double> strip) { note(strip); });
+    choose();
+    const std::string unfinished = path + ".part";
+    UnfinishedFiles files({unfinished});
+    fill(unfinished);
+    std::error_code failed;
+    std::filesystem::rename(unfinished, path, failed);
+    if (failed) throw Error(path, "it cannot be written", failed.message());
+    files.keep();
+    return GDALGetDataTypeName(type_);
+  }
+
+ private:
+  int width() const { return grid_.shape.width(); }
+  int height() const { return grid_.shape.height(); }
+
+  template <class Visit>
+  void each_strip(double from, Visit visit) {
+    std::vector<double> strip(size_t(kRows) * size_t(width()));
+    for (int row = 0; row < height(); row += kRows) {
+      const int rows = std::min(kRows, height() - row);
+      const std::span<double> samples(strip.data(), size_t(rows) * size_t(width()));
+      db_.read_samples(grid_.id, row, rows, samples);
+      visit(row, samples);
+      if (progress_) progress_(from + 0.5 * double(row + rows) / height());
+    }
+  }
+  void note(std::span<const double> strip) {
+    for (const double v : strip) {
+      if (std::isnan(v))
+        range_.holes = true;
+      else
+        range_.low = std::min(range_.low, v), range_.high = std::max(range_.high, v);
+    }
+  }
+
+  // The type of the file that was imported; signed bytes, which GDAL did not always know, get 16 bits.
+  void choose() {
+    type_ = GDALGetDataTypeByName(grid_.sample_type.c_str());
+    if (type_ == GDT_Unknown || (grid_.quantisation > 0 && GDALDataTypeIsInteger(type_))) type_ = GDT_Float64;
+    if (type_ == GDT_Byte && range_.low < 0) type_ = GDT_Int16;
+    if (!range_.holes) return;
+    nodata_ = grid_.nodata;
+    if (nodata_) return;
+    if (!GDALDataTypeIsInteger(type_)) {
+      nodata_ = std::numeric_limits<double>::quiet_NaN();
+    } else {  // holes of a mask: a value that no sample has
+      const int bits = GDALGetDataTypeSizeBits(type_);
+      const bool is_signed = GDALDataTypeIsSigned(type_);
+      const double least = is_signed ? -std::ldexp(1, bits - 1) : 0,
+                   most = std::ldexp(1, is_signed ? bits - 1 : bits) - 1;
+      nodata_ = range_.low > least ? least : most;
+      if (range_.low <= least && range_.high >= most) type_ = GDT_Float64, nodata_ = std::nan("");
+    }
+  }
+
+  void fill(const std::string& path) {
+    char** options = nullptr;
+    options = CSLSetNameValue(options, "TILED", "YES");
+    options = CSLSetNameValue(options, "COMPRESS", "DEFLATE");
+    options = CSLSetNameValue(options, "PREDICTOR", GDALDataTypeIsInteger(type_) ? "2" : "3");
+    options = CSLSetNameValue(options, "BIGTIFF", "IF_SAFER");
+    CPLPushErrorHandler(CPLQuietErrorHandler);
+    GDALDatasetUniquePtr out(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
+        path.c_str(), width(), height(), 1, type_, options));
+    CSLDestroy(options);
+    bool good = out != nullptr;
+    if (good) {
+      describe(*out);
+      GDALRasterBand& band = *out->GetRasterBand(1);
+      each_strip(0.5, [&](int row, std::span<const double> strip) {
+        std::vector<double> values(strip.begin(), strip.end());
+        for (double& v : values)
+          if (std::isnan(v)) v = *nodata_;
+        const int rows = int(values.size() / size_t(width()));
+        good = good && band.RasterIO(GF_Write, 0, row, width(), rows, values.data(), width(), rows,
+                                     GDT_Float64, 0, 0, nullptr) == CE_None;
+      });
+      CPLErrorReset();
+      out.reset();  // writes the last blocks: what fails is only told as an error
+      good = good && CPLGetLastErrorType() < CE_Failure;
+    }
+    CPLPopErrorHandler();
+    if (!good) throw Error(path, std::string("it cannot be written: ") + CPLGetLastErrorMsg());
+  }
+
+  void describe(GDALDataset& out) const {
+    const auto& n = grid_.frame.numbers();
+    double geotransform[] = {n[0] - (n[1] + n[2]) / 2, n[1], n[2], n[3] - (n[4] + n[5]) / 2, n[4], n[5]};
+    out.SetGeoTransform(geotransform);
+    if (!db_.crs().empty()) out.SetProjection(db_.crs().c_str());
+    if (!grid_.shape.pixel_is_area()) out.SetMetadataItem("AREA_OR_POINT", "Point");
+    GDALRasterBand& band = *out.GetRasterBand(1);
+    if (nodata_) band.SetNoDataValue(*nodata_);
+    if (grid_.raw_scale != 1) band.SetScale(grid_.raw_scale);
+    if (grid_.base != 0) band.SetOffset(grid_.base);
+    band.SetUnitType("m");
+  }
+
+  const Database& db_;
+  const GridInfo& grid_;
+  const std::function<void(double)>& progress_;
+  Range range_;
+  GDALDataType type_ = GDT_Unknown;
+  std::optional<double> nodata_;
+};
+
+}  // namespace
+
+std::string write_samples(const Database& db, const GridInfo& grid, const std::string& path,
+                          const std::function<void(double)>& progress) {
+  return SampleWriter(db, grid, progress).write(path);
+}
+
+}  // namespace patchwork

@@ -191,9 +191,12 @@ void Database::Impl::trim() {
 std::shared_ptr<const Chunk> Database::Impl::chunk(const GridInfo& grid, int level, int cx, int cy) {
   const std::uint64_t key = PatchId::make(grid.id, level, cx, cy).value;
   return chunks.get(key, sizeof(std::int32_t) * kChunkVertices * kChunkVertices, [&] {
+    std::shared_ptr<const Chunk> parent;  // what this one was predicted from
+    if (level + 1 < grid.shape.levels()) parent = this->chunk(grid, level + 1, cx / 2, cy / 2);
     const std::optional<Bytes> bytes = blob(Store::Kind::payload, key);
     auto chunk = std::make_shared<Chunk>(make_chunk(grid.shape, level, cx, cy));
-    const std::string bad = bytes ? decode_chunk(*bytes, *chunk) : "a payload chunk is missing";
+    const std::string bad =
+        bytes ? decode_chunk(*bytes, *chunk, parent.get(), cx, cy) : "a payload chunk is missing";
     if (!bad.empty()) throw Error(store->path(), grid.name + ": " + bad, kRestore);
     return chunk;
   });

@@ -182,23 +182,37 @@ class Importer {
     return y1 == shape().height() ? l.rows() : y1 >> l.level();
   }
 
+  // The lattice that a level's chunks are predicted from; null for the coarsest.
+  const Lattice* parent_of(const Lattice& l, const Ingest::Band* band) const {
+    const int up = l.level() + 1;
+    if (up == shape().levels()) return nullptr;
+    return band && up < Ingest::kStreamedLevels ? &band->levels[size_t(up)] : &ingest_.coarse(up);
+  }
+
+  // Chunks of level rows [r0, r1), four at a time: those that share a parent. `band` holds the rows of level
+  // 0 that the lattice was made of.
   void encode(const Lattice& l, int r0, int r1, const Ingest::Band* band) {
     const int first = r0 / kChunkVertices, end = (r1 + kChunkVertices - 1) / kChunkVertices;
-    const int across = shape().chunks_i(l.level());
+    const int across = shape().chunks_i(l.level()), parents = (across + 1) / 2;
+    const Lattice* const up = parent_of(l, band);
     std::vector<Bytes> blobs(size_t(std::max(0, end - first)) * size_t(across));
-    tbb::parallel_for(size_t(0), blobs.size(), [&](std::size_t k) {
-      blobs[k] = encode_chunk(cut_chunk(l, int(k) % across, first + int(k) / across, band));
+    tbb::parallel_for(0, blobs.empty() ? 0 : parents * ((end + 1) / 2 - first / 2), [&](int task) {
+      const int px = task % parents, py = first / 2 + task / parents;
+      const Chunk parent = up ? cut_codes(*up, px, py) : Chunk();
+      for (int cy = std::max(first, 2 * py); cy < std::min(end, 2 * py + 2); ++cy)
+        for (int cx = 2 * px; cx < std::min(across, 2 * px + 2); ++cx)
+          blobs[size_t(cy - first) * size_t(across) + size_t(cx)] =
+              encode_chunk(cut_chunk(l, cx, cy, band), up ? &parent : nullptr, cx, cy);
     });
     watch_.add_to(report_.seconds.encode);
-    for (std::size_t k = 0; k < blobs.size(); ++k)
-      db_.store->put_blob(
-          Store::Kind::payload,
-          PatchId::make(grid_.info.id, l.level(), int(k) % across, first + int(k) / across).value, blobs[k]);
+    for (std::size_t k = 0; k < blobs.size(); ++k) {
+      const PatchId id = PatchId::make(grid_.info.id, l.level(), int(k) % across, first + int(k) / across);
+      db_.store->put_blob(Store::Kind::payload, id.value, blobs[k]);
+    }
     watch_.add_to(report_.seconds.store);
   }
 
-  // `band` holds the rows of level 0 that the lattice was made of.
-  Chunk cut_chunk(const Lattice& l, int cx, int cy, const Ingest::Band* band) const {
+  Chunk cut_codes(const Lattice& l, int cx, int cy) const {
     Chunk c = make_chunk(shape(), l.level(), cx, cy);
     c.codes.resize(size_t(c.cols) * size_t(c.rows));
     for (int j = 0; j < c.rows; ++j) {
@@ -206,6 +220,11 @@ class Importer {
       std::int32_t* to = c.codes.data() + size_t(j) * size_t(c.cols);
       for (int i = 0; i < c.cols; ++i) to[i] = std::int32_t(from[i]);
     }
+    return c;
+  }
+
+  Chunk cut_chunk(const Lattice& l, int cx, int cy, const Ingest::Band* band) const {
+    Chunk c = cut_codes(l, cx, cy);
     if (ingest_.masks().empty()) return c;
     const MaskCells cells(ingest_.masks(), l.level());
     bool real = true;

@@ -1,6 +1,7 @@
 #include "db/payload.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "db/codec.h"
 
@@ -8,7 +9,14 @@ namespace patchwork {
 
 namespace {
 constexpr std::size_t kHeader = 8;
-constexpr std::byte kMagic{'C'}, kVersion{1};
+constexpr std::byte kMagic{'C'}, kVersion{2};
+constexpr int kMaxCell = 15;
+
+std::optional<ParentCodes> parent_codes(const Chunk* parent, int cx, int cy) {
+  if (!parent) return {};
+  return ParentCodes{parent->codes, parent->cols, parent->rows, cx % 2 * (kChunkVertices / 2),
+                     cy % 2 * (kChunkVertices / 2)};
+}
 }  // namespace
 
 Chunk make_chunk(const GridShape& shape, int level, int cx, int cy) {
@@ -17,8 +25,9 @@ Chunk make_chunk(const GridShape& shape, int level, int cx, int cy) {
   return {cols, rows, {}, {}};
 }
 
-std::vector<std::byte> encode_chunk(const Chunk& chunk) {
-  std::vector<std::byte> codes = encode_codes(chunk.codes, chunk.cols, chunk.rows);
+std::vector<std::byte> encode_chunk(const Chunk& chunk, const Chunk* parent, int cx, int cy) {
+  const std::optional<ParentCodes> above = parent_codes(parent, cx, cy);
+  std::vector<std::byte> codes = encode_codes(chunk.codes, chunk.cols, chunk.rows, above ? &*above : nullptr);
   std::vector<std::byte> out{kMagic, kVersion, std::byte(!chunk.cells.empty()), std::byte{0}};
   for (int shift = 0; shift < 32; shift += 8) out.push_back(std::byte(codes.size() >> shift & 0xff));
   out.insert(out.end(), codes.begin(), codes.end());
@@ -30,7 +39,8 @@ std::vector<std::byte> encode_chunk(const Chunk& chunk) {
   return out;
 }
 
-std::string decode_chunk(std::span<const std::byte> bytes, Chunk& chunk) {
+std::string decode_chunk(std::span<const std::byte> bytes, Chunk& chunk, const Chunk* parent, int cx,
+                         int cy) {
   if (bytes.size() < kHeader || bytes[0] != kMagic) return "not a payload chunk";
   if (bytes[1] != kVersion) return "a payload of an unknown version";
   std::size_t length = 0;
@@ -39,14 +49,18 @@ std::string decode_chunk(std::span<const std::byte> bytes, Chunk& chunk) {
   const std::size_t n = size_t(chunk.cols) * size_t(chunk.rows);
   chunk.codes.resize(n), chunk.cells.clear();
   const auto rest = bytes.subspan(kHeader);
-  if (std::string bad = decode_codes(rest.first(length), chunk.cols, chunk.rows, chunk.codes); !bad.empty())
+  const std::optional<ParentCodes> above = parent_codes(parent, cx, cy);
+  if (std::string bad =
+          decode_codes(rest.first(length), chunk.cols, chunk.rows, chunk.codes, above ? &*above : nullptr);
+      !bad.empty())
     return bad;
   if (bytes[2] == std::byte{0}) return length == rest.size() ? "" : "a payload with bytes left over";
   std::vector<std::int32_t> cells(n);
   if (std::string bad = decode_codes(rest.subspan(length), chunk.cols, chunk.rows, cells); !bad.empty())
     return bad;
+  chunk.cells.reserve(n);
   for (const std::int32_t c : cells) {
-    if (c < 0 || c > 15) return "a payload with an impossible cell mask";
+    if (c < 0 || c > kMaxCell) return "a payload with an impossible cell mask";
     chunk.cells.push_back(std::uint8_t(c));
   }
   return "";

@@ -23,11 +23,15 @@ struct Chunk {
 /// A chunk's size in vertices; smaller at the far ends of a level.
 Chunk make_chunk(const GridShape& shape, int level, int cx, int cy);
 
-/// Format: byte 'C', byte version 1, byte 1 if cells follow, byte 0, uint32 little-endian length of the
-/// codes' blob (codec.h), that blob, then the cells as a second blob of the same codec.
-std::vector<std::byte> encode_chunk(const Chunk& chunk);
+/// Format: byte 'C', byte version 2, byte 1 if cells follow, byte 0, uint32 little-endian length of the
+/// codes' blob (codec.h), that blob, then the cells as a second blob of the same codec, always without a
+/// parent. `parent` is chunk (cx / 2, cy / 2) of the level above, or null at the coarsest level.
+std::vector<std::byte> encode_chunk(const Chunk& chunk, const Chunk* parent = nullptr, int cx = 0,
+                                    int cy = 0);
 
-/// Fills `chunk`, whose cols and rows say what is expected; returns "" or what is wrong with the bytes.
-std::string decode_chunk(std::span<const std::byte> bytes, Chunk& chunk);
+/// Fills `chunk`, whose cols and rows say what is expected, given the parent that encoded it; returns "" or
+/// what is wrong with the bytes.
+std::string decode_chunk(std::span<const std::byte> bytes, Chunk& chunk, const Chunk* parent = nullptr,
+                         int cx = 0, int cy = 0);
 
 }  // namespace patchwork

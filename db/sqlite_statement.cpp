@@ -1,4 +1,4 @@
-#include "db/sqlite_statement.h"
+#include "db/sqlite_statement_impl.h"
 
 namespace patchwork {
 

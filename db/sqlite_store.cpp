@@ -13,7 +13,7 @@
 #include "db/codec.h"
 #include "db/error.h"
 #include "db/pack.h"
-#include "db/sqlite_statement.h"
+#include "db/sqlite_statement_impl.h"
 
 namespace patchwork {
 

@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "db/parent_predictor.h"
 #include "tests/seed.h"
 
 namespace patchwork {
@@ -16,7 +17,7 @@ Chunk chunk(int cols, int rows, bool cells, std::mt19937_64& random) {
   Chunk c{cols, rows, {}, {}};
   for (int k = 0; k < cols * rows; ++k) {
     c.codes.push_back(std::int32_t(random() % 2000) - 1000);
-    if (cells) c.cells.push_back(std::uint8_t(random() % 8));
+    if (cells) c.cells.push_back(std::uint8_t(random() % 16));
   }
   return c;
 }
@@ -40,6 +41,54 @@ TEST(Payload, GivesBackCodesAndCells) {
       EXPECT_EQ(back.codes, c.codes);
       EXPECT_EQ(back.cells, c.cells);
     }
+}
+
+// The parent of four chunks of `side` vertices, and the chunks, from one smooth surface with noise.
+Chunk cut(int step, int i0, int j0, int side, std::mt19937_64 noise) {
+  Chunk c{side, side, {}, {}};
+  for (int j = 0; j < side; ++j)
+    for (int i = 0; i < side; ++i) {
+      const int x = (i0 + i) * step, y = (j0 + j) * step;
+      noise.seed(std::uint64_t(x) << 32 | std::uint64_t(y));
+      c.codes.push_back(x * x / 90 - x * y / 70 + int(noise() % 8));
+    }
+  return c;
+}
+
+TEST(Payload, EachOfTheFourChunksOfAParentIsItsOwnQuarter) {
+  std::mt19937_64 random(test_seed(5));
+  const Chunk parent = cut(2, 0, 0, kChunkVertices, random);
+  for (const int cx : {0, 1})
+    for (const int cy : {0, 1}) {
+      const Chunk c = cut(1, cx * kChunkVertices, cy * kChunkVertices, kChunkVertices, random);
+      const Blob bytes = encode_chunk(c, &parent, cx, cy);
+      EXPECT_LT(double(bytes.size()), 0.8 * double(encode_chunk(c).size()));
+      Chunk back{c.cols, c.rows, {}, {}};
+      EXPECT_EQ(decode_chunk(bytes, back, &parent, cx + 6, cy + 2), "");
+      EXPECT_EQ(back.codes, c.codes);
+      EXPECT_EQ(decode_chunk(bytes, back, &parent, 1 - cx, cy), "");
+      EXPECT_NE(back.codes, c.codes);  // the control: another quarter is another prediction
+      EXPECT_EQ(decode_chunk(bytes, back), "codes: made with a parent");
+    }
+}
+
+TEST(Payload, EveryChunkOfAGridHasItsEvenVerticesInOneParent) {
+  std::mt19937_64 random(test_seed(6));
+  std::vector<std::pair<int, int>> sizes{{2, 2}, {113, 225}, {226, 112}, {449, 450}, {1025, 337}};
+  for (int k = 0; k < 20; ++k) sizes.emplace_back(2 + int(random() % 1500), 2 + int(random() % 1500));
+  for (const auto& [width, height] : sizes) {
+    const GridShape shape(width, height, true);
+    EXPECT_EQ(shape.chunks_i(shape.levels() - 1) * shape.chunks_j(shape.levels() - 1), 1);
+    for (int level = 0; level + 1 < shape.levels(); ++level)
+      for (int cy = 0; cy < shape.chunks_j(level); ++cy)
+        for (int cx = 0; cx < shape.chunks_i(level); ++cx) {
+          const Chunk c = make_chunk(shape, level, cx, cy), p = make_chunk(shape, level + 1, cx / 2, cy / 2);
+          const std::vector<std::int32_t> codes(std::size_t(p.cols) * std::size_t(p.rows));
+          EXPECT_TRUE(
+              (ParentCodes{codes, p.cols, p.rows, 56 * (cx % 2), 56 * (cy % 2)}.covers(c.cols, c.rows)))
+              << width << " x " << height << ", level " << level << ", chunk " << cx << ", " << cy;
+        }
+  }
 }
 
 TEST(Payload, AnotherShapeVersionOrMagicIsRefused) {

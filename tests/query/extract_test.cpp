@@ -129,7 +129,8 @@ TEST_F(Extract, SaysWhatItCostAndWhichBoundsItGives) {
       const GridInfo& g = grid(id).info;
       const LatticeRect d = g.shape.domain(id.level(), id.bx(), id.by());
       const bool rim = d.i0 < 0 || d.j0 < 0 || d.i1 > g.shape.width() - 1 || d.j1 > g.shape.height() - 1;
-      most = std::max(most, db_->patch(id).bottom + (rim ? g.rim_error : 0)), least = std::min(least, db_->patch(id).bottom);
+      most = std::max(most, db_->patch(id).bottom + (rim ? g.rim_error : 0)),
+      least = std::min(least, db_->patch(id).bottom);
     }
     EXPECT_EQ(x.bound_max, most);
     EXPECT_EQ(x.error_available, least);

@@ -14,6 +14,7 @@ struct BenchOptions {
   int size = 4097;   ///< samples, and pixels + 1, along each side
   int runs = 5;      ///< measured; one more of each side comes before to warm up
   int threads = 2;   ///< given to both sides
+  std::string file;  ///< of heights for `codec`; empty: a made terrain
   std::string keep;  ///< folder to work in and to leave; empty: a temporary one
 };
 
@@ -32,6 +33,7 @@ struct Work {
 };
 
 /// Each measures ours and the peers in turns, A B A B. Throws Error where a peer's program is missing.
+std::vector<Work> bench_codec(const BenchOptions& options);
 std::vector<Work> bench_import(const BenchOptions& options);
 std::vector<Work> bench_resample(const BenchOptions& options);
 

@@ -41,7 +41,9 @@ void print_table(const std::vector<Work>& works) {
 
 void run(Options o, const Common& common) {
   if (common.threads > 0) o.bench.threads = common.threads;
-  const std::vector<Work> works = o.name == "import" ? bench_import(o.bench) : bench_resample(o.bench);
+  const std::vector<Work> works = o.name == "codec"    ? bench_codec(o.bench)
+                                  : o.name == "import" ? bench_import(o.bench)
+                                                       : bench_resample(o.bench);
   if (!common.json) return print_table(works);
   Json all = Json::array();
   for (const Work& w : works) all.push_back(json_of(w));
@@ -53,9 +55,10 @@ void run(Options o, const Common& common) {
 void add_bench(CLI::App& app, Common& common) {
   auto o = std::make_shared<Options>();
   CLI::App* v = verb(app, common, "bench", "the project's own benchmarks, with peers beside it");
-  v->add_option("NAME", o->name, "import or resample")
+  v->add_option("NAME", o->name, "codec, import or resample")
       ->required()
-      ->check(CLI::IsMember({"import", "resample"}));
+      ->check(CLI::IsMember({"codec", "import", "resample"}));
+  v->add_option("--file", o->bench.file, "heights to code, integers (codec only)")->check(CLI::ExistingFile);
   v->add_option("--size", o->bench.size, "samples along each side")->check(CLI::Range(129, 16385));
   v->add_option("--runs", o->bench.runs, "measured runs of each side")->check(CLI::Range(1, 1000));
   v->add_option("--keep", o->bench.keep, "folder to work in, which is left as it is");

@@ -76,15 +76,16 @@ class Importer {
       : db_(db),
         options_(options),
         source_(source),
-        ingest_(source, options.memory, options.tolerance, [&](double share) { say(0.2 * share); }),
-        errors_(ingest_.shape(), ingest_.masks()) {
+        ingest_(std::in_place, source, options.memory, options.tolerance,
+                [&](double share) { say(0.2 * share); }),
+        errors_(std::in_place, ingest_->shape(), ingest_->masks()) {
     watch_.add_to(report_.seconds.scan);
   }
 
   ImportReport run() {
     describe();
-    for (int y = 0; y < shape().height(); y += ingest_.band_rows()) {
-      const Ingest::Band band = ingest_.read_band(y, std::min(shape().height(), y + ingest_.band_rows()));
+    for (int y = 0; y < shape().height(); y += ingest_->band_rows()) {
+      const Ingest::Band band = ingest_->read_band(y, std::min(shape().height(), y + ingest_->band_rows()));
       watch_.add_to(report_.seconds.scan);
       digest(band);
       measure(band);
@@ -93,7 +94,7 @@ class Importer {
       say(0.2 + 0.7 * double(band.y1) / shape().height());
     }
     for (int l = Ingest::kStreamedLevels; l < shape().levels(); ++l)
-      encode(ingest_.coarse(l), 0, shape().lattice_rows(l), nullptr);
+      encode(ingest_->coarse(l), 0, shape().lattice_rows(l), nullptr);
     watch_.add_to(report_.seconds.encode);
     finish_grid();
     if (!report_.duplicate_of.empty()) return report_;
@@ -109,12 +110,12 @@ class Importer {
 
   void describe() {
     GridInfo& g = grid_.info;
-    const Quantiser& q = ingest_.quantiser();
-    g.name = options_.name, g.frame = source_.frame(), g.shape = ingest_.shape(),
+    const Quantiser& q = ingest_->quantiser();
+    g.name = options_.name, g.frame = source_.frame(), g.shape = ingest_->shape(),
     g.accuracy = source_.accuracy();
     g.quantum = source_.scale() * q.quantum, g.base = source_.offset(), g.code_origin = q.origin;
     g.quantisation = q.error * std::abs(source_.scale());
-    g.holes = !ingest_.masks().empty(), g.sample_bytes = source_.sample_bytes();
+    g.holes = !ingest_->masks().empty(), g.sample_bytes = source_.sample_bytes();
     g.sample_type = source_.sample_type(), g.raw_scale = source_.scale(), g.nodata = source_.nodata();
     const double numbers[] = {g.accuracy,
                               g.quantum,
@@ -165,7 +166,7 @@ class Importer {
   }
 
   const Lattice& lattice(const Ingest::Band& band, int level) const {
-    return level < Ingest::kStreamedLevels ? band.levels[size_t(level)] : ingest_.coarse(level);
+    return level < Ingest::kStreamedLevels ? band.levels[size_t(level)] : ingest_->coarse(level);
   }
 
   void measure(const Ingest::Band& band) {
@@ -173,7 +174,7 @@ class Importer {
     tbb::parallel_for(0, tasks * shape().levels(), [&](int task) {
       const int level = task / tasks, y0 = band.y0 + task % tasks * kTaskRows;
       const int y1 = std::min(band.y1, y0 + kTaskRows);
-      errors_.measure(lattice(band, level), band.levels[0], band.valid, y0, y1);
+      errors_->measure(lattice(band, level), band.levels[0], band.valid, y0, y1);
     });
   }
 
@@ -186,7 +187,7 @@ class Importer {
   const Lattice* parent_of(const Lattice& l, const Ingest::Band* band) const {
     const int up = l.level() + 1;
     if (up == shape().levels()) return nullptr;
-    return band && up < Ingest::kStreamedLevels ? &band->levels[size_t(up)] : &ingest_.coarse(up);
+    return band && up < Ingest::kStreamedLevels ? &band->levels[size_t(up)] : &ingest_->coarse(up);
   }
 
   // Chunks of level rows [r0, r1), four at a time: those that share a parent. `band` holds the rows of level
@@ -225,8 +226,8 @@ class Importer {
 
   Chunk cut_chunk(const Lattice& l, int cx, int cy, const Ingest::Band* band) const {
     Chunk c = cut_codes(l, cx, cy);
-    if (ingest_.masks().empty()) return c;
-    const MaskCells cells(ingest_.masks(), l.level());
+    if (ingest_->masks().empty()) return c;
+    const MaskCells cells(ingest_->masks(), l.level());
     bool real = true;
     for (int j = 0; j < c.rows; ++j)
       for (int i = 0; i < c.cols; ++i) {
@@ -262,28 +263,35 @@ class Importer {
 
   void make_records() {
     grid_.patches = PatchRecords(shape().blocks());
-    std::vector<Offer> offers(ingest_.masks().empty() ? 0 : shape().blocks());
-    std::vector<PatchRecord> records(shape().blocks());
-    tbb::parallel_for(size_t(0), records.size(), [&](std::size_t k) {
-      const GridShape::Block b = shape().block(k);
-      PatchRecord& p = records[k];
-      p.flags = PatchRecord::kExists;
-      double outline = 0;
-      if (!offers.empty()) outline = look_at_holes(b, p, offers[k]), offers[k].index = std::uint32_t(k);
-      const std::array<double, 3> delta = errors_.of(b.level, b.bx, b.by);
-      const double floor = source_.accuracy_in(shape().domain(b.level, b.bx, b.by)) + grid_.info.quantisation;
-      for (std::size_t i = 0; i < 3; ++i)
-        p.error[i] = std::max(floor + delta[i] * std::abs(grid_.info.quantum), outline);
-      p.bottom = b.level == 0 ? p.error[0] : *std::max_element(p.error.begin(), p.error.end());
+    LazyTable<RecordRun>& runs = grid_.patches.runs();
+    tbb::parallel_for(size_t(0), runs.size(), [&](std::size_t n) {
+      RecordRun& run = runs.change(n);
+      for (std::size_t i = 0; i < run.records.size(); ++i)
+        make_record(n * RecordRun::kRecords + i, run.records[i], run.offers);
     });
-    for (std::size_t k = 0; k < records.size(); ++k) grid_.patches.change(k) = records[k];
-    for (const Offer& o : offers)
-      if (records[o.index].exists() && records[o.index].ragged()) grid_.patches.add_offer(o);
+    errors_.reset(), ingest_.reset();
+  }
+
+  void make_record(std::size_t k, PatchRecord& p, std::vector<Offer>& offers) const {
+    const GridShape::Block b = shape().block(k);
+    p.flags = PatchRecord::kExists;
+    double outline = 0;
+    if (!ingest_->masks().empty()) {
+      Offer offer;
+      outline = look_at_holes(b, p, offer);
+      offer.index = std::uint32_t(k);
+      if (p.exists() && p.ragged()) offers.push_back(offer);
+    }
+    const std::array<double, 3> delta = errors_->of(b.level, b.bx, b.by);
+    const double floor = source_.accuracy_in(shape().domain(b.level, b.bx, b.by)) + grid_.info.quantisation;
+    for (std::size_t i = 0; i < 3; ++i)
+      p.error[i] = std::max(floor + delta[i] * std::abs(grid_.info.quantum), outline);
+    p.bottom = b.level == 0 ? p.error[0] : *std::max_element(p.error.begin(), p.error.end());
   }
 
   // Sets the record's flags; returns the error that the outline of holes alone gives it, metres.
   double look_at_holes(const GridShape::Block& b, PatchRecord& p, Offer& offer) const {
-    const MaskCells cells(ingest_.masks(), b.level);
+    const MaskCells cells(ingest_->masks(), b.level);
     bool answers = false, differ = false;
     const LatticeRect d = shape().domain(b.level, b.bx, b.by);
     const int step = 1 << b.level, i0 = b.bx * kKernelCells, j0 = b.by * kKernelCells;
@@ -326,8 +334,8 @@ class Importer {
   const RasterSource& source_;
   ImportReport report_;
   Stopwatch watch_;
-  Ingest ingest_;
-  PatchErrors errors_;
+  std::optional<Ingest> ingest_;  // both until the records are made
+  std::optional<PatchErrors> errors_;
   Grid grid_;
   DigestBuilder digest_;
   double rim_i_ = 0, rim_j_ = 0;

@@ -15,11 +15,11 @@ namespace patchwork {
 
 namespace {
 
-constexpr int kScanRows = 256;
-constexpr int kMargin = 24;  // rows around a band: stencils of the streamed levels, and filled holes
+constexpr int kStripRows = 64;  // raw samples that are held at a time, where all do not fit
+constexpr int kMargin = 24;     // rows around a band: stencils of the streamed levels, and filled holes
 constexpr double kCodeRange = 1 << 23;  // codes stay exact in float32, their differences too
 constexpr int kFillRings = 4;
-constexpr std::size_t kBandSamples = std::size_t{4} << 20;  // of a band whose raw samples are at hand
+constexpr std::size_t kBandSamples = std::size_t{4} << 20;  // of a band: more gain nothing
 
 // The exponent of the lowest bit set in a finite number.
 int lowest_bit(double v) {
@@ -62,15 +62,11 @@ PATCHWORK_VECTORIZED void codes_of(const double* raw, std::size_t n, double quan
 Ingest::Ingest(const RasterSource& source, std::size_t memory, double tolerance, const Progress& progress)
     : source_(source), shape_(source.width(), source.height(), source.pixel_is_area()) {
   const std::size_t samples = size_t(shape_.width()) * size_t(shape_.height());
-  const int chunk_rows = kChunkVertices << (kStreamedLevels - 1);
-  if (source.float_is_exact() && samples * sizeof(float) <= memory / 4) {
-    kept_ = Buffer<float>(samples);
-    band_rows_ = std::max(1, int(kBandSamples / size_t(shape_.width()) / size_t(chunk_rows))) * chunk_rows;
-  } else {  // a row of a band costs its code, its raw form, its mask and a third for the levels made of it
-    const std::size_t row_bytes = size_t(shape_.width()) * 24;
-    band_rows_ =
-        int(std::clamp<std::size_t>(memory / 4 / row_bytes / size_t(chunk_rows), 1, 64)) * chunk_rows;
-  }
+  if (source.float_is_exact() && samples * sizeof(float) <= memory / 4) kept_ = Buffer<float>(samples);
+  // A sample of a band costs its code, its mask, and its code and a third again in the levels made of it.
+  const std::size_t chunk_rows = std::size_t{kChunkVertices} << (kStreamedLevels - 1);
+  const std::size_t band = std::min(kBandSamples, memory / 4 / 12) / (size_t(shape_.width()) * chunk_rows);
+  band_rows_ = int(std::max<std::size_t>(1, band) * chunk_rows);
   knot_cols_ = knots_along(shape_.width(), shape_.levels());
   knot_rows_ = knots_along(shape_.height(), shape_.levels());
   knots_.resize(knot_cols_.size() * knot_rows_.size());
@@ -84,26 +80,39 @@ Ingest::Ingest(const RasterSource& source, std::size_t memory, double tolerance,
     masks_ = CellMasks::from_cells(std::move(cells_), shape_);
     if (masks_.at(shape_.levels() - 1, 0, 0) == 0 && shape_.levels() == 1 && shape_.width() == 2)
       throw Error(source.path(), "it holds no cell with data at all four corners");
+  } else {
+    means_ = {};
   }
   make_coarse();
 }
 
+// Calls visit(row, rows, samples) for strips of raw samples of rows [first, end).
+template <class Raw, class Visit>
+void Ingest::read_strips(int first, int end, Visit visit) const {
+  Buffer<Raw> strip(size_t(std::min(kStripRows, end - first)) * size_t(shape_.width()));
+  for (int y = first; y < end; y += kStripRows) {
+    const int rows = std::min(kStripRows, end - y);
+    source_.read_rows(y, rows, std::span<Raw>(strip.data(), size_t(rows) * size_t(shape_.width())));
+    visit(y, rows, strip.data());
+  }
+}
+
 void Ingest::scan(const Progress& progress) {
   low_ = INFINITY, high_ = -INFINITY;
-  std::vector<double> buffer;
-  for (int y = 0; y < shape_.height(); y += kScanRows) {
-    const int rows = std::min(kScanRows, shape_.height() - y);
-    const std::size_t n = size_t(rows) * size_t(shape_.width());
-    if (!kept_.empty()) {
-      float* raw = kept_.data() + size_t(y) * size_t(shape_.width());
-      source_.read_rows(y, rows, std::span<float>(raw, n));
-      scan_rows(y, rows, raw);
-    } else {
-      buffer.resize(n);
-      source_.read_rows(y, rows, std::span<double>(buffer));
-      scan_rows(y, rows, buffer.data());
-    }
+  const auto note = [&](int y, int rows, const auto* raw) {
+    scan_rows(y, rows, raw);
     if (progress) progress(double(y + rows) / shape_.height());
+  };
+  if (kept_.empty()) {
+    if (source_.float_is_exact()) return read_strips<float>(0, shape_.height(), note);
+    return read_strips<double>(0, shape_.height(), note);
+  }
+  for (int y = 0; y < shape_.height(); y += 4 * kStripRows) {
+    const int rows = std::min(4 * kStripRows, shape_.height() - y);
+    const std::size_t n = size_t(rows) * size_t(shape_.width());
+    float* raw = kept_.data() + size_t(y) * size_t(shape_.width());
+    source_.read_rows(y, rows, std::span<float>(raw, n));
+    note(y, rows, raw);
   }
 }
 
@@ -240,7 +249,7 @@ void Ingest::make_coarse() {
 
 // The vertices next to data continue them linearly, so that an interpolant's slope there is that of the data;
 // what lies deeper is the mean of its neighbours, ring by ring, then the mean of a neighbourhood.
-void Ingest::fill_holes(std::vector<float>& codes, std::span<const std::uint8_t> valid, int first,
+void Ingest::fill_holes(std::span<float> codes, std::span<const std::uint8_t> valid, int first,
                         int rows) const {
   const int w = shape_.width();
   std::vector<std::uint8_t> ring(valid.begin(), valid.end());  // 1: has a value
@@ -277,25 +286,24 @@ Ingest::Band Ingest::read_band(int y0, int y1) const {
   const int w = shape_.width(), first = std::max(0, y0 - kMargin),
             end = std::min(shape_.height(), y1 + kMargin);
   const std::size_t n = size_t(end - first) * size_t(w);
-  std::vector<float> codes(n);
+  Buffer<float> codes(n);
   Band band{y0, y1, {}, {}};
   if (!masks_.empty()) band.valid.resize(n);
-  const auto take = [&](const auto* raw) {
-    tbb::parallel_for(size_t(0), size_t(end - first), [&](std::size_t r) {
-      const std::size_t from = r * size_t(w), to = from + size_t(w);
-      codes_of(raw + from, size_t(w), quantiser_.quantum, double(quantiser_.origin), codes.data() + from);
+  const auto take = [&](int y, int rows, const auto* raw) {
+    tbb::parallel_for(size_t(0), size_t(rows), [&](std::size_t r) {
+      const std::size_t from = r * size_t(w), to = (size_t(y - first) + r) * size_t(w);
+      codes_of(raw + from, size_t(w), quantiser_.quantum, double(quantiser_.origin), codes.data() + to);
       if (band.valid.empty()) return;
-      for (std::size_t k = from; k < to; ++k) band.valid[k] = raw[k] == raw[k];
+      for (std::size_t k = 0; k < size_t(w); ++k) band.valid[to + k] = raw[from + k] == raw[from + k];
     });
   };
-  if (!kept_.empty()) {
-    take(kept_.data() + size_t(first) * size_t(w));
-  } else {
-    std::vector<double> raw(n);
-    source_.read_rows(first, end - first, std::span<double>(raw));
-    take(raw.data());
-  }
-  if (!band.valid.empty()) fill_holes(codes, band.valid, first, end - first);
+  if (!kept_.empty())
+    take(first, end - first, kept_.data() + size_t(first) * size_t(w));
+  else if (source_.float_is_exact())
+    read_strips<float>(first, end, take);
+  else
+    read_strips<double>(first, end, take);
+  if (!band.valid.empty()) fill_holes({codes.data(), n}, band.valid, first, end - first);
   for (int l = 0; l < std::min(kStreamedLevels, shape_.levels()); ++l) {
     // Every level row whose samples are at hand; the one beyond the last sample needs the last and one
     // before.

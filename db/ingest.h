@@ -53,6 +53,8 @@ class Ingest {
   template <class Raw>
   struct OctetScan;
   void scan(const Progress& progress);
+  template <class Raw, class Visit>
+  void read_strips(int first, int end, Visit visit) const;
   template <class Raw>
   void scan_rows(int y, int rows, const Raw* raw);
   void note_cells(int y, int rows, const std::vector<std::uint8_t>& valid);
@@ -61,7 +63,7 @@ class Ingest {
   void make_coarse();
   double knot(int i, int j) const;
   double code_of(double raw) const;
-  void fill_holes(std::vector<float>& codes, std::span<const std::uint8_t> valid, int first, int rows) const;
+  void fill_holes(std::span<float> codes, std::span<const std::uint8_t> valid, int first, int rows) const;
 
   const RasterSource& source_;
   GridShape shape_;

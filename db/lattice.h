@@ -3,8 +3,8 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
+#include "db/buffer.h"
 #include "db/grid_shape.h"
 
 namespace patchwork {
@@ -32,7 +32,7 @@ class Lattice {
   std::size_t offset(int r) const { return size_t(r - first_ + 2) * size_t(cols_ + 4) + 2; }
   void extrapolate_row(int from, int towards_inside, int m);
   int level_ = 0, cols_ = 0, rows_ = 0, first_ = 0, count_ = 0;
-  std::vector<float> samples_;
+  Buffer<float> samples_;  // not cleared: what can be read is written first
 };
 
 /// The vertices that a level takes from the grid along one axis of n samples: 0, 2^level, ... and, where the

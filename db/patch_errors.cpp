@@ -205,6 +205,11 @@ class Reference {
   const Positions& positions_;
 };
 
+float rounded_up(double v) {
+  const auto f = float(v);
+  return double(f) < v ? std::nextafter(f, INFINITY) : f;
+}
+
 }  // namespace
 
 PatchErrors::PatchErrors(const GridShape& shape, const CellMasks& cells) : shape_(shape), cells_(cells) {
@@ -321,16 +326,17 @@ void PatchErrors::note(int level, int segment, const Positions& positions, int p
     const int a = i == 0 ? 0 : positions.place(segment_start(i, level));
     const int b = std::min(positions.place(segment_start(i + 1, level)), positions.n - 1);
     Ninth& ninth = out.ninths[size_t(segment) * size_t(out.ni) + size_t(i)];
-    for (int p = std::max(a, p0); p <= std::min(b, p1 - 1); ++p) {
-      ninth.linear = std::max(ninth.linear, linear[p - p0]);
-      ninth.smooth = std::max(ninth.smooth, smooth[p - p0]);
-    }
+    double worst = 0, worst_smooth = 0;
+    for (int p = std::max(a, p0); p <= std::min(b, p1 - 1); ++p)
+      worst = std::max(worst, linear[p - p0]), worst_smooth = std::max(worst_smooth, smooth[p - p0]);
+    ninth.linear = std::max(ninth.linear, rounded_up(worst));
+    ninth.smooth = std::max(ninth.smooth, rounded_up(worst_smooth));
   }
 }
 
 std::array<double, 3> PatchErrors::of(int level, int bx, int by) const {
   const Level& l = levels_[size_t(level)];
-  Ninth worst;
+  float linear = 0, smooth = 0;
   // Five segments; behind the last block all that is left.
   const auto end = [](int b, int blocks, int segments) {
     return b + 1 == blocks ? segments : std::min(segments, 3 * b + 4);
@@ -338,13 +344,13 @@ std::array<double, 3> PatchErrors::of(int level, int bx, int by) const {
   for (int s = std::max(0, 3 * by - 1); s < end(by, shape_.blocks_j(level), l.nj); ++s)
     for (int i = std::max(0, 3 * bx - 1); i < end(bx, shape_.blocks_i(level), l.ni); ++i) {
       const Ninth& n = l.ninths[size_t(s) * size_t(l.ni) + size_t(i)];
-      worst = {std::max(worst.linear, n.linear), std::max(worst.smooth, n.smooth)};
+      linear = std::max(linear, n.linear), smooth = std::max(smooth, n.smooth);
     }
   const auto counted = [](double e) {
     const double tiny = std::ldexp(1, -30);
     return e <= tiny ? 0 : e * (1 + 1e-12) + tiny;
   };
-  return {counted(worst.linear), counted(worst.smooth), counted(worst.smooth)};
+  return {counted(double(linear)), counted(double(smooth)), counted(double(smooth))};
 }
 
 }  // namespace patchwork

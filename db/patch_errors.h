@@ -43,8 +43,8 @@ class PatchErrors {
 
  private:
   class Strip;
-  struct Ninth {  // a ninth of a block: rim, middle, rim along each axis
-    double linear = 0, smooth = 0;
+  struct Ninth {                   // a ninth of a block: rim, middle, rim along each axis
+    float linear = 0, smooth = 0;  // rounded up
   };
   struct Level {
     int ni, nj;

@@ -206,8 +206,8 @@ SqliteStore::SqliteStore(const std::string& path, StoreMode mode) : path_(path) 
       throw Error(path, "it is not a database", "name a Patchwork database or a new file");
     throw;
   }
-  exec("PRAGMA synchronous = FULL; PRAGMA cache_size = -16000; PRAGMA mmap_size = 268435456");
-  if (mode == StoreMode::read) exec("PRAGMA query_only = 1");
+  exec("PRAGMA synchronous = FULL; PRAGMA cache_size = -16000");
+  if (mode == StoreMode::read) exec("PRAGMA mmap_size = 268435456; PRAGMA query_only = 1");
 }
 
 std::optional<std::string> SqliteStore::fact(const std::string& key) {

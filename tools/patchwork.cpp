@@ -1,5 +1,6 @@
 // The command `patchwork`: one verb, one file in verbs/.
 #include <fmt/format.h>
+#include <gdal.h>
 #include <malloc.h>
 #include <oneapi/tbb/global_control.h>
 
@@ -12,6 +13,7 @@
 namespace {
 
 constexpr int kFailed = 1, kWrongUsage = 2;
+constexpr std::uint64_t kGdalShare = 16;  // of the memory setting: GDAL's blocks; files are read row by row
 
 // Large blocks come and go: GDAL makes every tile of a file in memory that grows by a tenth at a time, an
 // import builds its levels band by band. With glibc's first thresholds each goes back to the system and
@@ -48,6 +50,7 @@ int main(int argc, char** argv) {
 
   for (CLI::App* v : app.get_subcommands({}))
     v->parse_complete_callback([&] {
+      GDALSetCacheMax64(GIntBig(common.memory / kGdalShare));
       if (common.threads > 0)
         threads = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                         common.threads);

@@ -14,6 +14,7 @@ struct BenchOptions {
   int size = 4097;   ///< samples, and pixels + 1, along each side
   int runs = 5;      ///< measured; one more of each side comes before to warm up
   int threads = 2;   ///< given to both sides
+  int seconds = 60;  ///< that readers are kept busy
   std::string file;  ///< of heights for `codec`; empty: a made terrain
   std::string keep;  ///< folder to work in and to leave; empty: a temporary one
 };
@@ -35,7 +36,9 @@ struct Work {
 /// Each measures ours and the peers in turns, A B A B. Throws Error where a peer's program is missing.
 std::vector<Work> bench_codec(const BenchOptions& options);
 std::vector<Work> bench_import(const BenchOptions& options);
+std::vector<Work> bench_readers(const BenchOptions& options);
 std::vector<Work> bench_resample(const BenchOptions& options);
+std::vector<Work> bench_update(const BenchOptions& options);
 
 /// The folder of a benchmark's files: removed with all in it, unless the options say where to keep it.
 class WorkFolder {

@@ -3,9 +3,18 @@
 
 #include <fmt/format.h>
 
+#include <map>
+
 namespace patchwork::cli {
 
 namespace {
+
+const std::map<std::string, std::vector<Work> (*)(const BenchOptions&)> kBenches{
+    {"codec", &bench_codec},
+    {"import", &bench_import},
+    {"readers", &bench_readers},
+    {"resample", &bench_resample},
+    {"update", &bench_update}};
 
 struct Options {
   std::string name;
@@ -39,11 +48,15 @@ void print_table(const std::vector<Work>& works) {
   if (!works.empty()) fmt::print("answer: {}\n", works.front().answer.dump());
 }
 
+std::vector<std::string> names() {
+  std::vector<std::string> all;
+  for (const auto& [name, bench] : kBenches) all.push_back(name);
+  return all;
+}
+
 void run(Options o, const Common& common) {
   if (common.threads > 0) o.bench.threads = common.threads;
-  const std::vector<Work> works = o.name == "codec"    ? bench_codec(o.bench)
-                                  : o.name == "import" ? bench_import(o.bench)
-                                                       : bench_resample(o.bench);
+  const std::vector<Work> works = kBenches.at(o.name)(o.bench);
   if (!common.json) return print_table(works);
   Json all = Json::array();
   for (const Work& w : works) all.push_back(json_of(w));
@@ -55,10 +68,10 @@ void run(Options o, const Common& common) {
 void add_bench(CLI::App& app, Common& common) {
   auto o = std::make_shared<Options>();
   CLI::App* v = verb(app, common, "bench", "the project's own benchmarks, with peers beside it");
-  v->add_option("NAME", o->name, "codec, import or resample")
-      ->required()
-      ->check(CLI::IsMember({"codec", "import", "resample"}));
+  v->add_option("NAME", o->name, "what to measure")->required()->check(CLI::IsMember(names()));
   v->add_option("--file", o->bench.file, "heights to code, integers (codec only)")->check(CLI::ExistingFile);
+  v->add_option("--seconds", o->bench.seconds, "how long readers are kept busy (readers only)")
+      ->check(CLI::Range(1, 3600));
   v->add_option("--size", o->bench.size, "samples along each side")->check(CLI::Range(129, 16385));
   v->add_option("--runs", o->bench.runs, "measured runs of each side")->check(CLI::Range(1, 1000));
   v->add_option("--keep", o->bench.keep, "folder to work in, which is left as it is");

@@ -44,11 +44,16 @@ const std::array<Shelf, 3> kShelves{{{"records", "a run of patch records", true}
                                      {"tree_page", "a page of the R-tree", true},
                                      {"payload", "a payload chunk", false}}};
 
-// In a folder that is read-only SQLite cannot make the -shm file that a reader needs; where no -wal lies
-// beside it, the file alone is the whole state. CAVEAT: a writer with more rights than ours is then not seen.
-bool is_frozen(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::absolute(path).parent_path();
-  return access(folder.c_str(), W_OK) != 0 && !std::filesystem::exists(path + "-wal");
+// In a folder that is read-only, or on a full disk, SQLite cannot make the -shm file that a reader needs;
+// where no log lies beside the file, it alone is the whole state. CAVEAT: a writer with more rights than ours
+// is then not seen.
+bool in_frozen_folder(const std::string& path) {
+  return access(std::filesystem::absolute(path).parent_path().c_str(), W_OK) != 0;
+}
+bool is_whole(const std::string& path) {
+  std::error_code absent;
+  const auto log = std::filesystem::file_size(path + "-wal", absent);
+  return absent || log == 0;
 }
 
 std::string frozen_uri(const std::string& path) {
@@ -148,6 +153,7 @@ class SqliteStore : public Store {
       throw Error(path_, what + " is damaged (its checksum differs)", advice_for(SQLITE_CORRUPT));
     return bytes;
   }
+  void connect(StoreMode mode, bool frozen);
   void put_grid(const GridInfo& info, const char* sql);
   void prepare_file(bool may_create) {
     const std::int64_t application = pragma("PRAGMA application_id"), version = pragma("PRAGMA user_version");
@@ -182,32 +188,38 @@ class SqliteStore : public Store {
 };
 
 SqliteStore::SqliteStore(const std::string& path, StoreMode mode) : path_(path) {
-  // A reader that may write closes the file behind it: SQLite then takes -wal and -shm away with the last
-  // one.
-  const bool look_only = mode == StoreMode::read && access(path.c_str(), W_OK) != 0;
-  const int flags = look_only || (mode == StoreMode::read && is_frozen(path))
-                        ? SQLITE_OPEN_READONLY
-                        : SQLITE_OPEN_READWRITE | (mode == StoreMode::create ? SQLITE_OPEN_CREATE : 0);
   if (mode != StoreMode::create && !std::filesystem::exists(path))
     throw Error(path, "there is no such database", "make one with: patchwork import DB FILE...");
   if (std::filesystem::is_directory(path)) throw Error(path, "it is a folder", "name a database file");
-  const bool frozen = mode == StoreMode::read && is_frozen(path);
-  const std::string name = frozen ? frozen_uri(path) : path;
-  const int how = flags | SQLITE_OPEN_NOMUTEX | (frozen ? SQLITE_OPEN_URI : 0);
-  const int opened = sqlite3_open_v2(name.c_str(), &db_, how, nullptr);
-  connection_.reset(db_);
-  if (opened != SQLITE_OK) throw Error(path, sqlite3_errmsg(db_), advice_for(SQLITE_CANTOPEN));
-  sqlite3_extended_result_codes(db_, 1);
-  sqlite3_busy_timeout(db_, kBusyMilliseconds);
+  const bool reads = mode == StoreMode::read;
+  connect(mode, reads && in_frozen_folder(path) && is_whole(path));
   try {
     prepare_file(mode == StoreMode::create);
   } catch (const Error&) {
-    if (sqlite3_errcode(db_) == SQLITE_NOTADB)
+    const int code = sqlite3_errcode(db_) & 0xff;
+    if (code == SQLITE_NOTADB)
       throw Error(path, "it is not a database", "name a Patchwork database or a new file");
-    throw;
+    const bool no_room = code == SQLITE_IOERR || code == SQLITE_FULL || code == SQLITE_CANTOPEN;
+    if (!reads || !no_room || !is_whole(path)) throw;
+    connect(mode, true);
+    prepare_file(false);
   }
   exec("PRAGMA synchronous = FULL; PRAGMA cache_size = -16000");
-  if (mode == StoreMode::read) exec("PRAGMA mmap_size = 268435456; PRAGMA query_only = 1");
+  if (reads) exec("PRAGMA mmap_size = 268435456; PRAGMA query_only = 1");
+}
+
+// A reader that may write closes the file behind it: SQLite then takes -wal and -shm away with the last one.
+void SqliteStore::connect(StoreMode mode, bool frozen) {
+  const bool look_only = frozen || (mode == StoreMode::read && access(path_.c_str(), W_OK) != 0);
+  const int flags = look_only ? SQLITE_OPEN_READONLY
+                              : SQLITE_OPEN_READWRITE | (mode == StoreMode::create ? SQLITE_OPEN_CREATE : 0);
+  const std::string name = frozen ? frozen_uri(path_) : path_;
+  const int how = flags | SQLITE_OPEN_NOMUTEX | (frozen ? SQLITE_OPEN_URI : 0);
+  const int opened = sqlite3_open_v2(name.c_str(), &db_, how, nullptr);
+  connection_.reset(db_);
+  if (opened != SQLITE_OK) throw Error(path_, sqlite3_errmsg(db_), advice_for(SQLITE_CANTOPEN));
+  sqlite3_extended_result_codes(db_, 1);
+  sqlite3_busy_timeout(db_, kBusyMilliseconds);
 }
 
 std::optional<std::string> SqliteStore::fact(const std::string& key) {

@@ -74,7 +74,7 @@ Region RegionOptions::region() const {
 void print(const Json& document) { fmt::print("{}\n", document.dump(2)); }
 
 void note(const Common& common, const std::string& text) {
-  if (!common.quiet) fmt::print(stderr, "{}\n", text);
+  if (!common.quiet) std::fputs((text + "\n").c_str(), stderr);  // fmt::print throws where stderr is full
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {

@@ -25,6 +25,9 @@ void keep_freed_heap() {
 #endif
 }
 
+// Not by fmt::print, which throws where stderr cannot be written.
+void complain(const std::string& what) { std::fputs(("patchwork: " + what + "\n").c_str(), stderr); }
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -61,10 +64,10 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : kWrongUsage;
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "patchwork: out of memory; lower --memory or ask for less\n");
+    complain("out of memory; lower --memory or ask for less");
     return kFailed;
   } catch (const std::exception& e) {
-    fmt::print(stderr, "patchwork: {}\n", e.what());
+    complain(e.what());
     return kFailed;
   }
   return 0;

@@ -30,6 +30,10 @@ class Fault : public CliTest {
   void SetUp() override {
     CliTest::SetUp();
     database_ = hill_database();
+    if (const char* disk = std::getenv("PATCHWORK_SMALL_DISK")) {
+      const std::string there = std::string(disk) + "/hills.pwk";
+      write_text(there, text_of(database_)), database_ = there;
+    }
     RasterFile file = hill_file(900, 900, -200, 300, 3);
     file.at = [at = file.at](int i, int j) { return at(i, j) + ((i * 7919 + j * 104729) % 64) / 256.0; };
     survey_ = make(file, "survey.tif");
@@ -54,6 +58,10 @@ class Fault : public CliTest {
     for (const Grid& g : db.grids()) hills |= g.info.name == "hills", survey |= g.info.name == "survey";
     EXPECT_TRUE(hills) << "an imported grid is missing";
     return survey;
+  }
+  void TearDown() override {
+    for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(database_ + suffix);
+    CliTest::TearDown();
   }
   std::string database_, survey_, other_;
 };

@@ -28,6 +28,7 @@ struct GridInfo {
   std::int64_t code_origin = 0;
   double quantisation = 0;  ///< q, metres: largest distance between a sample and its stored form
   double rim_error = 0;     ///< metres added to the bound beyond the outer samples (extrapolated half cell)
+  double lowest = 0, highest = 0;  ///< of its samples, metres
   bool holes = false;
   /// How the source file held its samples, so that they can be written back as they were: a raw sample is
   /// `quantum / raw_scale * (code_origin + code)`, of a GDAL type, e.g. "UInt16".

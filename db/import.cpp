@@ -115,6 +115,9 @@ class Importer {
     g.accuracy = source_.accuracy();
     g.quantum = source_.scale() * q.quantum, g.base = source_.offset(), g.code_origin = q.origin;
     g.quantisation = q.error * std::abs(source_.scale());
+    const double a = source_.scale() * ingest_->lowest() + source_.offset(),
+                 b = source_.scale() * ingest_->highest() + source_.offset();
+    g.lowest = std::min(a, b), g.highest = std::max(a, b);
     g.holes = !ingest_->masks().empty(), g.sample_bytes = source_.sample_bytes();
     g.sample_type = source_.sample_type(), g.raw_scale = source_.scale(), g.nodata = source_.nodata();
     const double numbers[] = {g.accuracy,

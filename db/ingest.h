@@ -36,6 +36,8 @@ class Ingest {
 
   const GridShape& shape() const { return shape_; }
   const Quantiser& quantiser() const { return quantiser_; }
+  double lowest() const { return low_; }  ///< raw
+  double highest() const { return high_; }
   const CellMasks& masks() const { return masks_; }
   const Lattice& coarse(int level) const { return coarse_[size_t(level - kStreamedLevels)]; }
 

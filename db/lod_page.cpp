@@ -217,6 +217,10 @@ std::uint64_t LodPage::uniform_hits(const Extent& region, float error) const {
     hit[s] = std::uint8_t(hit[s] & (xmin[s] <= region.xmax) & (region.xmin <= xmax[s]));
   for (std::uint32_t s = 0; s < kSlots; ++s)
     hit[s] = std::uint8_t(hit[s] & (ymin[s] <= region.ymax) & (region.ymin <= ymax[s]));
+  return mask_of_used(hit);
+}
+
+std::uint64_t LodPage::mask_of_used(const std::uint8_t (&hit)[kSlots]) const {
   const std::uint64_t mask = mask_of(hit);
   return count == kSlots ? mask : mask & ((std::uint64_t{1} << count) - 1);
 }

@@ -58,6 +58,8 @@ struct LodPage {
   void remove(std::uint32_t s);    ///< the last entry takes its place
   LodBox bounds() const;           ///< REQUIRES: count > 0
 
+  /// Bit s is hit[s] (0 or 1) of the slots in use.
+  std::uint64_t mask_of_used(const std::uint8_t (&hit)[kSlots]) const;
   /// Bit s is set if box s meets the closed region and bottom <= error < top.
   std::uint64_t uniform_hits(const Extent& region, float error) const;
   /// The box that grows least (volume, errors in octaves) when `box` joins it; ties by the smaller volume.

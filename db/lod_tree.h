@@ -55,6 +55,11 @@ class LodTree {
     return walk([&](const LodPage& page) { return hits(page, meets); }, emit);
   }
 
+  /// The same with hits(const LodPage&) -> mask of accepted slots, a page at a time.
+  template <class Hits, class Emit>
+  VisitCost visit(Hits hits, Emit emit) const {
+    return walk(hits, emit);
+  }
   /// The same for a uniform cut: boxes that meet the closed region, with bottom <= error < top.
   template <class Emit>
   VisitCost visit_uniform(const Extent& region, double error, Emit emit) const {

@@ -73,6 +73,8 @@ nlohmann::json facts_of(const GridInfo& g) {
           {"code_origin", g.code_origin},
           {"quantisation", g.quantisation},
           {"rim_error", g.rim_error},
+          {"lowest", g.lowest},
+          {"highest", g.highest},
           {"holes", g.holes},
           {"sample_type", g.sample_type},
           {"sample_bytes", g.sample_bytes},
@@ -95,7 +97,7 @@ GridInfo info_from(const nlohmann::json& f) {
   g.accuracy = f.at("accuracy"), g.quantum = f.at("quantum"), g.base = f.at("base");
   g.code_origin = f.at("code_origin"), g.quantisation = f.at("quantisation"), g.rim_error = f.at("rim_error");
   g.holes = f.at("holes"), g.sample_type = f.at("sample_type"), g.sample_bytes = f.at("sample_bytes");
-  g.raw_scale = f.at("raw_scale");
+  g.raw_scale = f.at("raw_scale"), g.lowest = f.at("lowest"), g.highest = f.at("highest");
   if (!f.at("nodata").is_null()) g.nodata = f.at("nodata").get<double>();
   return g;
 }

@@ -2,20 +2,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "db/database.h"
-#include "query/region.h"
+#include "query/cut.h"
 
 namespace patchwork {
-
-/// A uniform cut: e(x, y) = error over the region.
-struct UniformCut {
-  double error = 0;  ///< metres; 0 means the best there is
-  Region region = {};
-  bool strict =
-      false;  ///< only patches with bottom <= error; else, where that is not available, the best there is
-};
 
 struct Cost {
   std::size_t nodes = 0, boxes = 0;  ///< of the R-tree: pages read, boxes compared
@@ -31,7 +26,32 @@ struct Extraction {
   double error_available = 0;  ///< metres: the smallest bottom among them
 };
 
-/// Throws Error: error negative or not a number.
+/// `strict`: only patches whose bottom the tolerance allows somewhere; else, where that is not available, the
+/// best there is.
+Extraction extract(const Database& db, const CutSurface& cut, bool strict = false);
+/// Throw Error for cuts that are none (see make_surface).
 Extraction extract(const Database& db, const UniformCut& cut);
+template <class Cut>  // ViewCut, CorridorCut; a template, so that braces mean a uniform cut
+requires requires(const Cut& cut) { make_surface(cut), cut.strict; }
+Extraction extract(const Database& db, const Cut& cut) { return extract(db, *make_surface(cut), cut.strict); }
+
+/// What a client that holds the patches of `before` must get and may drop, each by id.
+struct Difference {
+  std::vector<PatchId> add, drop;
+};
+Difference difference(const Extraction& now, const Extraction& before);
+
+/// The smallest error, or pixel error, whose answer keeps to the budget.
+struct Budget {
+  std::size_t patches = SIZE_MAX, bytes = SIZE_MAX;  ///< bytes of samples in memory
+};
+struct Budgeted {
+  double error = 0;  ///< metres or pixels: what was asked for in the end
+  Extraction extraction;
+};
+/// `cut_at(error)` makes the cut. Searches [0, most] by halving; what it returns keeps to the budget unless
+/// not even `most` does. Throws what cut_at throws.
+Budgeted extract_within(const Database& db, const Budget& budget, double most,
+                        const std::function<std::unique_ptr<CutSurface>(double error)>& cut_at);
 
 }  // namespace patchwork

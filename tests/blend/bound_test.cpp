@@ -1,6 +1,8 @@
 // BoundHolds (hard cases): no height leaves its bound, and priority keeps to the bound that was asked for.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "tests/blend/scene.h"
 
 namespace patchwork {
@@ -68,6 +70,61 @@ TEST_F(BoundHolds, IsWhatWasAskedForWhereverAKernelOffersIt) {
     for (std::size_t k = 0; k < points.size(); ++k)
       weighted_beyond += offered[k] && w.bound[k] > e + kHairline * x.bound_max;
   }
+  EXPECT_GT(weighted_beyond, 0u) << "negative control: the weighted blend is diluted by coarse neighbours";
+}
+
+// PATCHWORK_TRIALS=1000 takes as many cameras as the design asks for.
+int cameras() {
+  const char* given = std::getenv("PATCHWORK_TRIALS");
+  return given ? std::atoi(given) : 40;
+}
+
+TEST_F(BoundHolds, UnderViewsWhereverAKernelOffersIt) {
+  const auto offers = [](double error, Point at) {
+    bool offered = false;
+    each_patch(db(), [&](const Grid& g, std::size_t index, const GridShape::Block& b) {
+      offered |= g.patches[index].bottom <= error && holds(g, g.info.shape.kernel(b.level, b.bx, b.by), at);
+    });
+    return offered;
+  };
+  std::mt19937_64 random(test_seed(4));
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  const Extent e = db().extent();
+  std::size_t seen = 0, weighted_beyond = 0, finer = 0;
+  for (int n = 0; n < cameras(); ++n) {
+    const double ground = uniform(250, 350);
+    ViewCut view{.eye = {uniform(e.xmin, e.xmax), uniform(e.ymin, e.ymax), ground + uniform(5, 600)},
+                 .look = {uniform(e.xmin, e.xmax), uniform(e.ymin, e.ymax), ground},
+                 .fov_degrees = uniform(20, 80),
+                 .pixel_error = std::exp2(uniform(0, 6))};
+    view = over_terrain_of(db(), view);
+    const auto surface = make_surface(view);
+    const Extraction x = extract(db(), view);
+    const Points points = random_points(e, 3000, random);
+    const Answers a = evaluate(db(), x.patches, points), best = evaluate(db(), 0, points);
+    const Answers w = evaluate(db(), x.patches, points, {.composition = Composition::weighted});
+    std::vector<bool> in_view(points.size());
+    const std::vector<Point> corners = footprint(view);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      bool inside = corners.size() >= 3;
+      for (std::size_t c = 0; inside && c < corners.size(); ++c) {
+        const Point &p = corners[c], &q = corners[(c + 1) % corners.size()];
+        inside = (q.x - p.x) * (points.y[k] - p.y) - (q.y - p.y) * (points.x[k] - p.x) > 0;
+      }
+      const Point at{points.x[k], points.y[k]};
+      const double asked = surface->at(at);
+      if (!inside || !offers(asked, at)) continue;
+      ++seen;
+      ASSERT_LE(a.bound[k], asked + kHairline * x.bound_max) << points.x[k] << " " << points.y[k];
+      ASSERT_LE(std::abs(a.height[k] - hills(points.x[k], points.y[k])), a.bound[k]);
+      weighted_beyond += w.bound[k] > asked + kHairline * x.bound_max;
+      finer += a.bound[k] > best.bound[k];
+    }
+  }
+  EXPECT_GT(seen, 1000u);
+  EXPECT_GT(finer, 100u) << "coarser patches are used where they will do";
   EXPECT_GT(weighted_beyond, 0u) << "negative control: the weighted blend is diluted by coarse neighbours";
 }
 

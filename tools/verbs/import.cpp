@@ -78,8 +78,8 @@ std::string text_of(const ImportReport& r, bool dry_run, const std::optional<Com
       "{}: {} {} patches ({} redundant), {} of other grids hidden, {} shortened; accuracy {:g} m; {:.2f} s",
       r.name, dry_run ? "would add" : "added", r.patches, r.dormant, r.hidden, r.lowered, r.accuracy,
       r.seconds.total);
-  text += fmt::format("\n  where: {:.10g} {:.10g} {:.10g} {:.10g}", r.extent.xmin, r.extent.ymin,
-                      r.extent.xmax, r.extent.ymax);
+  text += fmt::format("\n  where: {:.3f} {:.3f} {:.3f} {:.3f}", r.extent.xmin, r.extent.ymin, r.extent.xmax,
+                      r.extent.ymax);
   if (compared)
     text += fmt::format(
         "\n  against what is there: offset {:+.2f} m, tilt {:+.3f} m/km in x and {:+.3f} m/km in y, spread "

@@ -16,6 +16,8 @@ Json json_of(const GridInfo& g) {
           {"step", {g.frame.step_i(), g.frame.step_j()}},
           {"quantum", g.quantum},
           {"quantisation", g.quantisation},
+          {"lowest", g.lowest},
+          {"highest", g.highest},
           {"holes", g.holes},
           {"pixel_is_area", g.shape.pixel_is_area()}};
 }

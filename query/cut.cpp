@@ -1,0 +1,272 @@
+#include "query/cut.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "db/error.h"
+
+namespace patchwork {
+
+namespace {
+
+void require(bool holds, const char* what, const char* problem) {
+  if (!holds) throw Error(what, problem);
+}
+bool is_error(double e) { return e >= 0 && std::isfinite(e); }
+
+class UniformSurface : public CutSurface {
+ public:
+  explicit UniformSurface(const UniformCut& cut) : cut_(cut), limit_(float_at_most(cut.error)) {}
+  double at(Point) const override { return cut_.error; }
+  ToleranceRange over(const Frame&, const LatticeRect&) const override { return {cut_.error, cut_.error}; }
+  bool meets(const Grid& g, const GridShape::Block& b) const override { return cut_.region.meets(g, b); }
+  std::uint64_t hits(const LodPage& page) const override {
+    return page.uniform_hits(cut_.region.bounds(), limit_);
+  }
+
+ private:
+  UniformCut cut_;
+  float limit_;
+};
+
+using Vector = std::array<double, 3>;
+Vector operator+(const Vector& a, const Vector& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+Vector operator*(double s, const Vector& a) { return {s * a[0], s * a[1], s * a[2]}; }
+Vector cross(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+Vector normalised(const Vector& a) { return (1 / std::hypot(a[0], a[1], a[2])) * a; }
+
+double turn(const Point& a, const Point& b, const Point& c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+// Andrew's monotone chain (1979).
+std::vector<Point> convex_hull(std::vector<Point> points) {
+  std::sort(points.begin(), points.end(),
+            [](const Point& a, const Point& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  std::vector<Point> hull;
+  const auto add = [&](const Point& p, std::size_t least) {
+    while (hull.size() >= least + 2 && turn(hull[hull.size() - 2], hull.back(), p) <= 0) hull.pop_back();
+    hull.push_back(p);
+  };
+  for (const Point& p : points) add(p, 0);
+  const std::size_t lower = hull.size();
+  for (std::size_t k = points.size() - 1; k-- > 0;) add(points[k], lower - 1);
+  hull.pop_back();
+  return hull;
+}
+
+// A side of a convex region: inside are the points with nx x + ny y <= most.
+struct Side {
+  double nx, ny, most;
+};
+
+class ViewSurface : public CutSurface {
+ public:
+  explicit ViewSurface(const ViewCut& cut)
+      : eye_{cut.eye.x, cut.eye.y},
+        slope_(cut.pixel_error * 2 * std::tan(cut.fov_degrees * (M_PI / 360)) / cut.height),
+        corners_(footprint(cut)) {
+    for (std::size_t k = 0; corners_.size() >= 3 && k < corners_.size(); ++k) {
+      const Point &a = corners_[k], &b = corners_[(k + 1) % corners_.size()];
+      const double nx = b.y - a.y, ny = a.x - b.x;  // outward of a counterclockwise polygon
+      sides_.push_back({nx, ny, std::max(nx * a.x + ny * a.y, nx * b.x + ny * b.y)});
+      bounds_ = {std::min(bounds_.xmin, a.x), std::min(bounds_.ymin, a.y), std::max(bounds_.xmax, a.x),
+                 std::max(bounds_.ymax, a.y)};
+    }
+  }
+
+  double at(Point p) const override { return slope_ * std::hypot(p.x - eye_.x, p.y - eye_.y); }
+
+  // The frame's axes are orthogonal, so the nearest point of a rectangle is found axis by axis.
+  ToleranceRange over(const Frame& frame, const LatticeRect& r) const override {
+    const Point e = frame.to_lattice(eye_.x, eye_.y);
+    const double i = frame.step_i(), j = frame.step_j();
+    const auto near = [](double v, double a, double b) { return std::max({a - v, v - b, 0.0}); };
+    const auto far = [](double v, double a, double b) { return std::max(std::abs(a - v), std::abs(b - v)); };
+    return {slope_ * std::hypot(i * near(e.x, r.i0, r.i1), j * near(e.y, r.j0, r.j1)),
+            slope_ * std::hypot(i * far(e.x, r.i0, r.i1), j * far(e.y, r.j0, r.j1))};
+  }
+
+  // Two convex sets are apart if a side of one of them parts them.
+  bool meets(const Grid& grid, const GridShape::Block& b) const override {
+    if (sides_.empty()) return false;
+    const LatticeRect d = grid.info.shape.domain(b.level, b.bx, b.by);
+    const Frame& f = grid.info.frame;
+    const Point rect[] = {f.to_domain(d.i0, d.j0), f.to_domain(d.i1, d.j0), f.to_domain(d.i1, d.j1),
+                          f.to_domain(d.i0, d.j1)};
+    for (const Side& s : sides_) {
+      const auto beyond = [&](const Point& p) { return s.nx * p.x + s.ny * p.y > s.most; };
+      if (std::all_of(std::begin(rect), std::end(rect), beyond)) return false;
+    }
+    LatticeRect seen{INFINITY, INFINITY, -INFINITY, -INFINITY};
+    for (const Point& c : corners_) {
+      const Point p = f.to_lattice(c.x, c.y);
+      seen = {std::min(seen.i0, p.x), std::min(seen.j0, p.y), std::max(seen.i1, p.x), std::max(seen.j1, p.y)};
+    }
+    return seen.i0 <= d.i1 && d.i0 <= seen.i1 && seen.j0 <= d.j1 && d.j0 <= seen.j1;
+  }
+
+  // Squares instead of roots; a hair of slack makes up for their rounding. All slots are compared, in use or
+  // not: loops of fixed length become vectors.
+  std::uint64_t hits(const LodPage& page) const override {
+    if (sides_.empty()) return 0;
+    constexpr double kHair = 1e-9;
+    constexpr std::uint32_t n = LodPage::kSlots;
+    std::uint8_t hit[n];
+    const double x = eye_.x, y = eye_.y, k = slope_ * slope_;
+    for (std::uint32_t s = 0; s < n; ++s) {
+      const double left = page.xmin[s] - x, right = x - page.xmax[s];
+      const double below = page.ymin[s] - y, above = y - page.ymax[s];
+      const double dx = std::max(std::max(left, right), 0.0), dy = std::max(std::max(below, above), 0.0);
+      const double fx = std::max(std::abs(left), std::abs(right)),
+                   fy = std::max(std::abs(below), std::abs(above));
+      const double bottom = page.bottom[s], top = page.top[s];
+      hit[s] = std::uint8_t((bottom * bottom * (1 - kHair) <= k * (fx * fx + fy * fy)) &
+                            (k * (dx * dx + dy * dy) * (1 - kHair) < top * top));
+    }
+    for (std::uint32_t s = 0; s < n; ++s)
+      hit[s] = std::uint8_t(hit[s] & (page.xmin[s] <= bounds_.xmax) & (bounds_.xmin <= page.xmax[s]) &
+                            (page.ymin[s] <= bounds_.ymax) & (bounds_.ymin <= page.ymax[s]));
+    for (const Side& side : sides_) {
+      const double* const px = side.nx > 0 ? page.xmin : page.xmax;
+      const double* const py = side.ny > 0 ? page.ymin : page.ymax;
+      const double most = side.most + kHair * std::abs(side.most);
+      for (std::uint32_t s = 0; s < n; ++s)
+        hit[s] = std::uint8_t(hit[s] & (side.nx * px[s] + side.ny * py[s] <= most));
+    }
+    return page.mask_of_used(hit);
+  }
+
+ private:
+  Point eye_;
+  double slope_;  // metres of tolerance a metre of distance
+  std::vector<Point> corners_;
+  Extent bounds_{INFINITY, INFINITY, -INFINITY, -INFINITY};  // of the corners
+  std::vector<Side> sides_;
+};
+
+double distance(const Point& p, const Point& a, const Point& b) {
+  const double dx = b.x - a.x, dy = b.y - a.y, length = dx * dx + dy * dy;
+  const double t = length > 0 ? std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / length, 0.0, 1.0) : 0;
+  return std::hypot(p.x - (a.x + t * dx), p.y - (a.y + t * dy));
+}
+
+// Distances over a rectangle lie within half its diagonal of that at its centre: a range that is a little too
+// wide, which a field may have.
+class CorridorSurface : public CutSurface {
+ public:
+  explicit CorridorSurface(const CorridorCut& cut) : cut_(cut) {}
+
+  double at(Point p) const override { return tolerance(from_line(p)); }
+  ToleranceRange over(const Frame& frame, const LatticeRect& r) const override {
+    const Point a = frame.to_domain(r.i0, r.j0), b = frame.to_domain(r.i1, r.j1);
+    return around({0.5 * (a.x + b.x), 0.5 * (a.y + b.y)}, 0.5 * std::hypot(b.x - a.x, b.y - a.y));
+  }
+  bool meets(const Grid& g, const GridShape::Block& b) const override { return cut_.region.meets(g, b); }
+  std::uint64_t hits(const LodPage& page) const override {
+    std::uint8_t hit[LodPage::kSlots] = {};
+    const Extent& region = cut_.region.bounds();
+    for (std::uint32_t s = 0; s < page.count; ++s) {
+      const LodBox b = page.box(s);
+      if (!Extent{b.xmin, b.ymin, b.xmax, b.ymax}.meets(region)) continue;
+      const ToleranceRange r = around({0.5 * (b.xmin + b.xmax), 0.5 * (b.ymin + b.ymax)},
+                                      0.5 * std::hypot(b.xmax - b.xmin, b.ymax - b.ymin));
+      hit[s] = double(b.bottom) <= r.high && r.low < double(b.top);
+    }
+    return page.mask_of_used(hit);
+  }
+
+ private:
+  double from_line(const Point& p) const {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k + 1 < cut_.line.size(); ++k)
+      nearest = std::min(nearest, distance(p, cut_.line[k], cut_.line[k + 1]));
+    return nearest;
+  }
+  double tolerance(double d) const {
+    const double t =
+        cut_.ramp > 0 ? std::clamp((d - cut_.width) / cut_.ramp, 0.0, 1.0) : double(d > cut_.width);
+    return cut_.error + t * (cut_.outside - cut_.error);
+  }
+  ToleranceRange around(const Point& centre, double radius) const {
+    const double d = from_line(centre), slack = 1e-9 * (d + radius);
+    const double a = tolerance(d - radius - slack), b = tolerance(d + radius + slack);
+    return {std::min(a, b), std::max(a, b)};
+  }
+  CorridorCut cut_;
+};
+
+}  // namespace
+
+std::vector<Point> footprint(const ViewCut& v) {
+  const Vector eye{v.eye.x, v.eye.y, v.eye.z};
+  const Vector forward = normalised({v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z});
+  const bool steep = std::hypot(forward[0], forward[1]) < 1e-9;
+  const Vector right = normalised(cross(forward, steep ? Vector{0, 1, 0} : Vector{0, 0, 1}));
+  const Vector up = cross(right, forward);
+  const double ty = std::tan(v.fov_degrees * (M_PI / 360)), tx = ty * v.width / v.height;
+  const auto corner = [&](double a, double b) {
+    return eye + v.far * (forward + (a * tx) * right + (b * ty) * up);
+  };
+  const Vector corners[] = {corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)};
+  // The corners of the pyramid between the planes of the lowest and the highest terrain.
+  std::vector<Point> points;
+  const auto clip = [&](const Vector& a, const Vector& b) {
+    for (const Vector& p : {a, b})
+      if (p[2] >= v.lowest && p[2] <= v.highest) points.push_back({p[0], p[1]});
+    for (const double z : {v.lowest, v.highest})
+      if ((a[2] < z) != (b[2] < z)) {
+        const double t = (z - a[2]) / (b[2] - a[2]);
+        points.push_back({a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])});
+      }
+  };
+  for (int k = 0; k < 4; ++k) clip(eye, corners[k]), clip(corners[k], corners[(k + 1) % 4]);
+  return points.size() < 3 ? std::vector<Point>() : convex_hull(std::move(points));
+}
+
+ViewCut over_terrain_of(const Database& db, ViewCut v) {
+  v.lowest = INFINITY, v.highest = -INFINITY, v.far = 1;
+  for (const Grid& g : db.grids()) {
+    const double rim = g.info.rim_error;  // what the half cell beyond the samples may add
+    v.lowest = std::min(v.lowest, g.info.lowest - rim), v.highest = std::max(v.highest, g.info.highest + rim);
+  }
+  if (db.grids().empty()) v.lowest = v.highest = 0;
+  const Extent e = db.grids().empty() ? Extent{} : db.extent();
+  for (const double x : {e.xmin, e.xmax})
+    for (const double y : {e.ymin, e.ymax})
+      for (const double z : {v.lowest, v.highest})
+        v.far = std::max(v.far, std::hypot(x - v.eye.x, y - v.eye.y, z - v.eye.z));
+  return v;
+}
+
+std::unique_ptr<CutSurface> make_surface(const UniformCut& cut) {
+  require(cut.error >= 0, "error", "it must be a number of metres, 0 or more");
+  return std::make_unique<UniformSurface>(cut);
+}
+
+std::unique_ptr<CutSurface> make_surface(const ViewCut& v) {
+  for (const double n : {v.eye.x, v.eye.y, v.eye.z, v.look.x, v.look.y, v.look.z, v.lowest, v.highest})
+    require(std::isfinite(n), "view", "eye, look and heights must be numbers");
+  require(std::hypot(v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z) > 0, "view",
+          "eye and look are the same point");
+  require(v.fov_degrees > 0 && v.fov_degrees < 180, "fov", "it must be between 0 and 180 degrees");
+  require(v.width > 0 && v.height > 0, "size", "width and height must be pixels, at least 1");
+  require(is_error(v.pixel_error), "pixel-error", "it must be a number of pixels, 0 or more");
+  require(v.far > 0 && std::isfinite(v.far) && v.lowest <= v.highest, "view", "it has no extent");
+  return std::make_unique<ViewSurface>(v);
+}
+
+std::unique_ptr<CutSurface> make_surface(const CorridorCut& c) {
+  require(c.line.size() >= 2, "corridor", "its line needs at least two points");
+  for (const Point& p : c.line)
+    require(std::isfinite(p.x) && std::isfinite(p.y), "corridor", "a point of its line is not finite");
+  for (const double e : {c.error, c.outside, c.width, c.ramp})
+    require(is_error(e), "corridor", "errors and widths must be metres, 0 or more");
+  return std::make_unique<CorridorSurface>(c);
+}
+
+}  // namespace patchwork

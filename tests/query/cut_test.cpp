@@ -1,0 +1,318 @@
+// Cuts: what they range over, which patches they take, how answers differ and keep to a budget.
+#include "query/cut.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <numbers>
+#include <random>
+#include <set>
+
+#include "query/extract.h"
+#include "tests/db/databases.h"
+#include "tests/grids.h"
+#include "tests/seed.h"
+
+namespace patchwork {
+namespace {
+
+// PATCHWORK_TRIALS=10000 asks as many cuts as the design does.
+int trials(int standard) {
+  const char* given = std::getenv("PATCHWORK_TRIALS");
+  return given ? std::atoi(given) : standard;
+}
+
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : random_(seed) {}
+  double uniform(double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); }
+  std::size_t below(std::size_t n) { return random_() % n; }
+
+  ViewCut view(double side) {
+    ViewCut v{.eye = {uniform(-side, side), uniform(-side, side), uniform(10, side)}, .look = {}};
+    v.look = {uniform(-side, side), uniform(-side, side), uniform(-100, 300)};
+    if (below(8) == 0) v.look = {v.eye.x, v.eye.y, v.eye.z - 100};  // straight down
+    v.fov_degrees = uniform(10, 100), v.pixel_error = std::exp2(uniform(-1, 4)),
+    v.far = uniform(100, 4 * side);
+    v.lowest = -60, v.highest = 250;
+    return v;
+  }
+  CorridorCut corridor(double side) {
+    CorridorCut c;
+    for (int k = 0; k < 4; ++k) c.line.push_back({uniform(-side, side), uniform(-side, side)});
+    c.error = uniform(0, 2), c.outside = uniform(2, 100), c.width = uniform(0, 100), c.ramp = uniform(0, 300);
+    return c;
+  }
+  UniformCut uniform_cut(double side) {
+    const double x = uniform(-side, side), y = uniform(-side, side), a = uniform(1, side);
+    return {.error = std::exp2(uniform(-4, 7)), .region = Region::inside(Extent{x, y, x + a, y + a})};
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+std::unique_ptr<CutSurface> any_cut(Random& random, double side, int kind) {
+  if (kind == 0) return make_surface(random.uniform_cut(side));
+  if (kind == 1) return make_surface(random.view(side));
+  return make_surface(random.corridor(side));
+}
+
+// --- Boxes alone: what a page's vector code accepts against the cut's own range and region, box by box.
+
+LodEntry random_box(Random& random, std::uint64_t id) {
+  const double side = std::exp2(random.uniform(2, 9)), x = random.uniform(-3000, 3000),
+               y = random.uniform(-3000, 3000), error = side * random.uniform(0.01, 0.1);
+  LodBox b{x, y, x + side, y + side, float(error), float(error * random.uniform(1, 4))};
+  if (id % 5 == 0) b.bottom = 0;
+  if (id % 7 == 0) b.top = INFINITY;
+  return {b, {id}};
+}
+
+// The grid whose one block of level 0 has exactly this domain, to ask the cut of it.
+struct AsGrid {
+  explicit AsGrid(const LodBox& b) {
+    const double step = (b.xmax - b.xmin) / 20;
+    grid.info.frame = Frame::from_trusted({b.xmin, step, 0, b.ymin, 0, (b.ymax - b.ymin) / 20});
+    grid.info.shape = GridShape(21, 21, false);
+  }
+  Grid grid;
+};
+
+void expect_no_box_missed(const LodTree& tree, const std::vector<LodEntry>& all, const CutSurface& cut,
+                          std::size_t& found, std::size_t& spare) {
+  std::set<std::uint64_t> hit;
+  tree.visit([&](const LodPage& page) { return cut.hits(page); },
+             [&](const LodEntry& e) { hit.insert(e.id.value); });
+  std::size_t exact = 0;
+  for (const LodEntry& e : all) {
+    const AsGrid as(e.box);
+    const ToleranceRange r = cut.over(as.grid.info.frame, as.grid.info.shape.domain(0, 0, 0));
+    if (!(double(e.box.bottom) <= r.high && r.low < double(e.box.top)) || !cut.meets(as.grid, {0, 0, 0}))
+      continue;
+    ++exact;
+    ASSERT_TRUE(hit.contains(e.id.value)) << "a box that the cut meets was not visited";
+  }
+  found += exact, spare += hit.size() - exact;
+}
+
+class LodTreeCuts : public testing::TestWithParam<int> {};
+
+TEST_P(LodTreeCuts, AgreeWithScanningEveryBoxBeforeAndAfterChanges) {
+  Random random(test_seed(1));
+  std::vector<LodEntry> all;
+  for (std::uint64_t k = 0; k < 20000; ++k) all.push_back(random_box(random, k));
+  LodTree tree = LodTree::build(all);
+  std::size_t found = 0, spare = 0;
+  for (int n = 0; n < trials(60); ++n) {
+    expect_no_box_missed(tree, all, *any_cut(random, 3000, GetParam()), found, spare);
+    if (n % 3) continue;
+    for (int change = 0; change < 30; ++change) {
+      std::swap(all[random.below(all.size())], all.back());
+      ASSERT_TRUE(tree.erase(all.back()));
+      all.back() = random_box(random, 100000 + std::uint64_t(n) * 100 + std::uint64_t(change));
+      tree.insert(all.back());
+    }
+  }
+  EXPECT_GT(found, 1000u);
+  EXPECT_LE(double(spare), 0.25 * double(found) + 100) << "boxes near the sides of a view, no more";
+}
+
+INSTANTIATE_TEST_SUITE_P(UniformViewCorridor, LodTreeCuts, testing::Range(0, 3));
+
+// --- Extractions of a database.
+
+double rough(double x, double y) {
+  return 40 * std::sin(x / 170) * std::cos(y / 130) + 5 * std::sin(x / 21 + y / 37) + std::sin(x * 1.7 + y);
+}
+
+class CutTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new GridFolder;
+    db_ = new Database(folder_->database());
+    folder_->add(
+        *db_,
+        of_terrain(
+            {.width = 300, .height = 280, .geotransform = rotated(-1500, 1400, 0, 10, 10), .accuracy = 1},
+            rough),
+        "base");
+    folder_->add(
+        *db_, of_terrain({.width = 250, .height = 200, .geotransform = rotated(-300, 200, 25, 3, 3)}, rough),
+        "survey");
+  }
+  static void TearDownTestSuite() { delete db_, delete folder_; }
+  static std::vector<PatchId> scanned(const CutSurface& cut, bool strict) {
+    std::vector<PatchId> ids;
+    for (const Grid& g : db_->grids())
+      each_patch(g, [&](std::size_t k, GridShape::Block b) {
+        const PatchRecord& p = g.patches[k];
+        const ToleranceRange r = cut.over(g.info.frame, g.info.shape.domain(b.level, b.bx, b.by));
+        const bool low_enough = p.bottom <= r.high || (p.best() && !strict);
+        if (!p.dormant() && low_enough && r.low < p.top && cut.meets(g, b)) ids.push_back(g.patch_id(k));
+      });
+    std::sort(ids.begin(), ids.end());
+    return ids;
+  }
+  static std::vector<PatchId> sorted(std::vector<PatchId> ids) {
+    std::sort(ids.begin(), ids.end());
+    return ids;
+  }
+  static GridFolder* folder_;
+  static Database* db_;
+};
+GridFolder* CutTest::folder_ = nullptr;
+Database* CutTest::db_ = nullptr;
+
+TEST_F(CutTest, ExtractionsAgreeWithScanningEveryPatch) {
+  Random random(test_seed(2));
+  std::size_t found = 0;
+  for (int n = 0; n < trials(300); ++n) {
+    const auto cut = any_cut(random, 2000, n % 3);
+    const bool strict = n % 2;
+    const std::vector<PatchId> ids = sorted(extract(*db_, *cut, strict).patches);
+    ASSERT_EQ(ids, scanned(*cut, strict)) << n;
+    found += ids.size();
+  }
+  EXPECT_GT(found, 1000u);
+}
+
+TEST_F(CutTest, RangesHoldEveryToleranceInside) {
+  Random random(test_seed(3));
+  int narrow = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const auto cut = any_cut(random, 2000, 1 + n % 2);
+    const double angle = random.uniform(0, 7), step = random.uniform(1, 20);
+    const Frame frame =
+        Frame::from_trusted({random.uniform(-2000, 2000), step * std::cos(angle), -step * std::sin(angle),
+                             random.uniform(-2000, 2000), step * std::sin(angle), step * std::cos(angle)});
+    const LatticeRect rect{-3, 2, random.uniform(0, 40), random.uniform(3, 40)};
+    const ToleranceRange r = cut->over(frame, rect);
+    double low = INFINITY, high = 0;
+    for (int k = 0; k < 60; ++k) {
+      const double a = k < 4 ? k % 2 : random.uniform(0, 1), b = k < 4 ? k / 2 : random.uniform(0, 1);
+      const double e =
+          cut->at(frame.to_domain(rect.i0 + a * (rect.i1 - rect.i0), rect.j0 + b * (rect.j1 - rect.j0)));
+      low = std::min(low, e), high = std::max(high, e);
+    }
+    EXPECT_LE(r.low, low * (1 + 1e-9) + 1e-9);
+    EXPECT_GE(r.high, high * (1 - 1e-9));
+    narrow += r.high < high * (1 + 1e-9);
+  }
+  EXPECT_GT(narrow, 500) << "and a view's is no wider than it must be: its largest is at a corner";
+}
+
+TEST_F(CutTest, AFootprintHoldsEveryPointThatIsSeen) {
+  Random random(test_seed(4));
+  int seen = 0, outside_smaller = 0;
+  for (int n = 0; n < 300; ++n) {
+    const ViewCut v = random.view(2000);
+    const std::vector<Point> corners = footprint(v);
+    const auto inside = [&](Point p, double slack) {
+      for (std::size_t k = 0; k < corners.size(); ++k) {
+        const Point &a = corners[k], &b = corners[(k + 1) % corners.size()];
+        const double side = (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
+        if (side < slack * std::hypot(b.x - a.x, b.y - a.y)) return false;
+      }
+      return corners.size() >= 3;
+    };
+    // Rays through random pixels, to random depths and heights of the terrain.
+    const double fx = v.look.x - v.eye.x, fy = v.look.y - v.eye.y, fz = v.look.z - v.eye.z,
+                 f = std::hypot(fx, fy, fz);
+    const bool steep = std::hypot(fx, fy) < 1e-9 * f;
+    const double rx = steep ? 1 : fy / std::hypot(fx, fy), ry = steep ? 0 : -fx / std::hypot(fx, fy);
+    const double ux = ry * fz / f, uy = -rx * fz / f, uz = (rx * fy - ry * fx) / f;
+    const double ty = std::tan(v.fov_degrees * std::numbers::pi / 360), tx = ty * v.width / v.height;
+    for (int k = 0; k < 200; ++k) {
+      const double a = random.uniform(-1, 1) * tx, b = random.uniform(-1, 1) * ty,
+                   t = random.uniform(0, v.far);
+      const double z = v.eye.z + t * (fz / f + b * uz);
+      if (z < v.lowest || z > v.highest) continue;
+      ++seen;
+      const Point p{v.eye.x + t * (fx / f + a * rx + b * ux), v.eye.y + t * (fy / f + a * ry + b * uy)};
+      EXPECT_TRUE(inside(p, -1e-6)) << n;
+      outside_smaller += !inside(p, 60);
+    }
+  }
+  EXPECT_GT(seen, 2000);
+  EXPECT_GT(outside_smaller, 100) << "negative control: a footprint 60 m smaller misses some";
+}
+
+TEST_F(CutTest, NeighbouringRegionsOfOneCutTakeTheSamePatchesWhereTheyOverlap) {
+  Random random(test_seed(5));
+  for (int n = 0; n < 50; ++n) {
+    CorridorCut left = random.corridor(1500), right = left;
+    const double x = random.uniform(-800, 800);
+    left.region = Region::inside(Extent{-2000, -2000, x, 2000});
+    right.region = Region::inside(Extent{x, -2000, 2000, 2000});
+    const auto in_both = [&](const Extraction& e) {
+      std::set<PatchId> ids;
+      for (const PatchId id : e.patches) {
+        const Grid& g = db_->grid(id.grid());
+        const GridShape::Block b{id.level(), id.bx(), id.by()};
+        if (left.region.meets(g, b) && right.region.meets(g, b)) ids.insert(id);
+      }
+      return ids;
+    };
+    EXPECT_EQ(in_both(extract(*db_, left)), in_both(extract(*db_, right)));
+  }
+}
+
+TEST_F(CutTest, ADifferenceTurnsOneAnswerIntoTheOther) {
+  Random random(test_seed(6));
+  Extraction before = extract(*db_, {.error = 3});
+  std::size_t kept = 0;
+  for (int n = 0; n < 50; ++n) {
+    const Extraction now = extract(*db_, *any_cut(random, 2000, n % 3));
+    const Difference d = difference(now, before);
+    std::set<PatchId> held(before.patches.begin(), before.patches.end());
+    for (const PatchId id : d.drop) ASSERT_EQ(held.erase(id), 1u);
+    kept += held.size();
+    for (const PatchId id : d.add) ASSERT_TRUE(held.insert(id).second);
+    EXPECT_EQ(std::vector<PatchId>(held.begin(), held.end()), sorted(now.patches));
+    before = now;
+  }
+  EXPECT_GT(kept, 0u);
+}
+
+TEST_F(CutTest, ABudgetIsKeptAndItsErrorFallsWithIt) {
+  double last = INFINITY;
+  const std::size_t all = extract(*db_, {.error = 0}).patches.size();
+  for (const std::size_t patches : {1u, 4u, 16u, 64u, 100000u}) {
+    const Budgeted b = extract_within(*db_, {.patches = patches}, 1000,
+                                      [](double error) { return make_surface(UniformCut{.error = error}); });
+    EXPECT_LE(b.extraction.patches.size(), std::max<std::size_t>(patches, 1));
+    EXPECT_LE(b.error, last);
+    if (b.error > 0 && patches >= 4) {
+      EXPECT_GT(extract(*db_, {.error = b.error * 0.999}).patches.size(), patches) << "no smaller error fits";
+    }
+    last = b.error;
+  }
+  EXPECT_EQ(last, 0);
+  EXPECT_GT(all, 64u);
+}
+
+TEST_F(CutTest, WhatIsNoCutIsRefused) {
+  EXPECT_NE(refusal_of([] { make_surface(UniformCut{.error = -1}); }), "");
+  EXPECT_NE(refusal_of([] { make_surface(UniformCut{.error = NAN}); }), "");
+  ViewCut v{.eye = {0, 0, 10}, .look = {5, 0, 0}, .far = 100, .highest = 50};
+  EXPECT_EQ(refusal_of([&] { make_surface(v); }), "") << "the control";
+  const auto refused = [&](auto spoil) {
+    ViewCut bad = v;
+    spoil(bad);
+    return refusal_of([&] { make_surface(bad); });
+  };
+  EXPECT_NE(refused([](ViewCut& c) { c.look = c.eye; }), "");
+  EXPECT_NE(refused([](ViewCut& c) { c.fov_degrees = 180; }), "");
+  EXPECT_NE(refused([](ViewCut& c) { c.height = 0; }), "");
+  EXPECT_NE(refused([](ViewCut& c) { c.pixel_error = -1; }), "");
+  EXPECT_NE(refused([](ViewCut& c) { c.eye.x = NAN; }), "");
+  EXPECT_NE(refused([](ViewCut& c) { c.far = 0; }), "");
+  EXPECT_NE(refusal_of([] { make_surface(CorridorCut{.line = {{0, 0}}}); }), "");
+  EXPECT_NE(refusal_of([] { make_surface(CorridorCut{.line = {{0, 0}, {1, 1}}, .ramp = -1}); }), "");
+}
+
+}  // namespace
+}  // namespace patchwork

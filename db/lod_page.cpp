@@ -7,6 +7,8 @@
 #include <cstring>
 #include <limits>
 
+#include "db/vectorized.h"
+
 // A page as bytes, format 1, all little-endian:
 //   u8 format, u8 level, u16 count, then per entry six box sides (xmin, ymin, xmax, ymax as f64, bottom, top
 //   as f32) and the u64 ref (in a leaf a patch id, else a page index).
@@ -128,6 +130,19 @@ std::uint64_t mask_of(const std::uint8_t (&hit)[LodPage::kSlots]) {
   return mask;
 }
 
+// All 64 slots are compared, in use or not: loops of fixed length become vectors, and the mask drops the
+// others.
+PATCHWORK_VECTORIZED void keep_error(const float* bottom, const float* top, float error,
+                                     std::uint8_t* __restrict hit) {
+  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s)
+    hit[s] = std::uint8_t((bottom[s] <= error) & (error < top[s]));
+}
+PATCHWORK_VECTORIZED void keep_region(const LodPage& p, const Extent& region, std::uint8_t* __restrict hit) {
+  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s)
+    hit[s] = std::uint8_t(hit[s] & (p.xmin[s] <= region.xmax) & (region.xmin <= p.xmax[s]) &
+                          (p.ymin[s] <= region.ymax) & (region.ymin <= p.ymax[s]));
+}
+
 template <class T>
 void put(std::vector<std::byte>& out, T value) {
   for (std::size_t i = 0; i < sizeof(T); ++i) out.push_back(std::byte(value >> 8 * i));
@@ -208,15 +223,11 @@ LodBox LodPage::bounds() const {
   return all;
 }
 
-// All 64 slots are compared, in use or not: loops of fixed length become vectors, and the mask drops the
-// others.
 std::uint64_t LodPage::uniform_hits(const Extent& region, float error) const {
   std::uint8_t hit[kSlots];
-  for (std::uint32_t s = 0; s < kSlots; ++s) hit[s] = std::uint8_t((bottom[s] <= error) & (error < top[s]));
-  for (std::uint32_t s = 0; s < kSlots; ++s)
-    hit[s] = std::uint8_t(hit[s] & (xmin[s] <= region.xmax) & (region.xmin <= xmax[s]));
-  for (std::uint32_t s = 0; s < kSlots; ++s)
-    hit[s] = std::uint8_t(hit[s] & (ymin[s] <= region.ymax) & (region.ymin <= ymax[s]));
+  keep_error(bottom, top, error, hit);
+  if (mask_of_used(hit) == 0) return 0;
+  keep_region(*this, region, hit);
   return mask_of_used(hit);
 }
 

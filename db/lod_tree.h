@@ -135,9 +135,14 @@ VisitCost LodTree::walk(Hits hits, Emit& emit) const {
   VisitCost cost;
   std::uint32_t depth = 0;
   const auto enter = [&](const LodPage& page) {
-    if (depth == kMaxHeight) refuse("its pages form a ring");
     ++cost.nodes, cost.boxes += page.count;
-    stack[depth++] = {&page, hits(page)};
+    std::uint64_t left = hits(page);
+    if (page.level > 0) {
+      if (depth == kMaxHeight) refuse("its pages form a ring");
+      stack[depth++] = {&page, left};
+    } else {
+      for (; left; left &= left - 1) emit(page.entry(std::uint32_t(std::countr_zero(left))));
+    }
   };
   enter(pages_[root_]);
   while (depth > 0) {
@@ -148,10 +153,7 @@ VisitCost LodTree::walk(Hits hits, Emit& emit) const {
     }
     const auto slot = std::uint32_t(std::countr_zero(top.left));
     top.left &= top.left - 1;
-    if (top.page->level == 0)
-      emit(top.page->entry(slot));
-    else
-      enter(pages_[top.page->child(slot)]);
+    enter(pages_[top.page->child(slot)]);
   }
   return cost;
 }

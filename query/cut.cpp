@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "db/error.h"
+#include "db/vectorized.h"
 
 namespace patchwork {
 
@@ -64,6 +65,37 @@ struct Side {
   double nx, ny, most;
 };
 
+// All slots are compared, in use or not: loops of fixed length become vectors. A hair of slack makes up for
+// the rounding of squares, which stand for roots.
+constexpr double kHair = 1e-9;
+
+// Boxes that meet `bounds` and whose errors meet k times the squared distance from the eye.
+PATCHWORK_VECTORIZED void near_enough(const LodPage& page, Point eye, double k, Extent bounds,
+                                      std::uint8_t* __restrict hit) {
+  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s) {
+    const double left = page.xmin[s] - eye.x, right = eye.x - page.xmax[s];
+    const double below = page.ymin[s] - eye.y, above = eye.y - page.ymax[s];
+    const double in_x = left > right ? left : right, in_y = below > above ? below : above;
+    const double dx = in_x > 0 ? in_x : 0, dy = in_y > 0 ? in_y : 0;
+    const double fx = std::abs(left) > std::abs(right) ? left : right;
+    const double fy = std::abs(below) > std::abs(above) ? below : above;
+    const double bottom = page.bottom[s], top = page.top[s];
+    hit[s] = std::uint8_t((bottom * bottom * (1 - kHair) <= k * (fx * fx + fy * fy)) &
+                          (k * (dx * dx + dy * dy) * (1 - kHair) < top * top) &
+                          (page.xmin[s] <= bounds.xmax) & (bounds.xmin <= page.xmax[s]) &
+                          (page.ymin[s] <= bounds.ymax) & (bounds.ymin <= page.ymax[s]));
+  }
+}
+
+// Of the hits those with a corner on the inner side.
+PATCHWORK_VECTORIZED void keep_inside(const LodPage& page, Side side, std::uint8_t* __restrict hit) {
+  const double* const px = side.nx > 0 ? page.xmin : page.xmax;
+  const double* const py = side.ny > 0 ? page.ymin : page.ymax;
+  const double most = side.most + kHair * std::abs(side.most);
+  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s)
+    hit[s] = std::uint8_t(hit[s] & (side.nx * px[s] + side.ny * py[s] <= most));
+}
+
 class ViewSurface : public CutSurface {
  public:
   explicit ViewSurface(const ViewCut& cut)
@@ -110,34 +142,13 @@ class ViewSurface : public CutSurface {
     return seen.i0 <= d.i1 && d.i0 <= seen.i1 && seen.j0 <= d.j1 && d.j0 <= seen.j1;
   }
 
-  // Squares instead of roots; a hair of slack makes up for their rounding. All slots are compared, in use or
-  // not: loops of fixed length become vectors.
   std::uint64_t hits(const LodPage& page) const override {
     if (sides_.empty()) return 0;
-    constexpr double kHair = 1e-9;
-    constexpr std::uint32_t n = LodPage::kSlots;
-    std::uint8_t hit[n];
-    const double x = eye_.x, y = eye_.y, k = slope_ * slope_;
-    for (std::uint32_t s = 0; s < n; ++s) {
-      const double left = page.xmin[s] - x, right = x - page.xmax[s];
-      const double below = page.ymin[s] - y, above = y - page.ymax[s];
-      const double dx = std::max(std::max(left, right), 0.0), dy = std::max(std::max(below, above), 0.0);
-      const double fx = std::max(std::abs(left), std::abs(right)),
-                   fy = std::max(std::abs(below), std::abs(above));
-      const double bottom = page.bottom[s], top = page.top[s];
-      hit[s] = std::uint8_t((bottom * bottom * (1 - kHair) <= k * (fx * fx + fy * fy)) &
-                            (k * (dx * dx + dy * dy) * (1 - kHair) < top * top));
-    }
-    for (std::uint32_t s = 0; s < n; ++s)
-      hit[s] = std::uint8_t(hit[s] & (page.xmin[s] <= bounds_.xmax) & (bounds_.xmin <= page.xmax[s]) &
-                            (page.ymin[s] <= bounds_.ymax) & (bounds_.ymin <= page.ymax[s]));
-    for (const Side& side : sides_) {
-      const double* const px = side.nx > 0 ? page.xmin : page.xmax;
-      const double* const py = side.ny > 0 ? page.ymin : page.ymax;
-      const double most = side.most + kHair * std::abs(side.most);
-      for (std::uint32_t s = 0; s < n; ++s)
-        hit[s] = std::uint8_t(hit[s] & (side.nx * px[s] + side.ny * py[s] <= most));
-    }
+    std::uint8_t hit[LodPage::kSlots];
+    near_enough(page, eye_, slope_ * slope_, bounds_, hit);
+    const std::uint64_t near = page.mask_of_used(hit);
+    if (near == 0) return 0;
+    for (const Side& side : sides_) keep_inside(page, side, hit);
     return page.mask_of_used(hit);
   }
 

@@ -1,8 +1,6 @@
 #include "db/database.h"
 
-#define XXH_INLINE_ALL
 #include <fmt/format.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +8,7 @@
 
 #include "db/cell_masks.h"
 #include "db/database_impl.h"
+#include "db/digest.h"
 #include "db/error.h"
 #include "db/surface_pool.h"
 
@@ -308,18 +307,17 @@ std::string Database::content_hash() const {
   for (const Grid& g : impl_->grids) order.push_back(&g);
   std::sort(order.begin(), order.end(),
             [](const Grid* a, const Grid* b) { return a->info.digest < b->info.digest; });
-  XXH3_state_t* state = XXH3_createState();
-  XXH3_128bits_reset(state);
+  DigestBuilder digest;
   for (const Grid* g : order) {  // a digest covers the grid's samples, of which the stored levels are made
-    XXH3_128bits_update(state, g->info.digest.data(), g->info.digest.size());
+    digest.add(g->info.digest.data(), g->info.digest.size());
     g->patches.runs().each([&](const RecordRun& run) {
-      XXH3_128bits_update(state, run.records.data(), run.records.size() * sizeof(PatchRecord));
-      XXH3_128bits_update(state, run.offers.data(), run.offers.size() * sizeof(Offer));
+      digest.add(run.records.data(), run.records.size());
+      digest.add(run.offers.data(), run.offers.size());
     });
   }
-  const XXH128_hash_t h = XXH3_128bits_digest(state);
-  XXH3_freeState(state);
-  return fmt::format("{:016x}{:016x}", h.high64, h.low64);
+  std::string hex;
+  for (const std::uint8_t byte : digest.get()) hex += fmt::format("{:02x}", byte);
+  return hex;
 }
 
 std::shared_ptr<const PatchSurface> Database::surface(PatchId id) const {

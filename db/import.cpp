@@ -1,15 +1,14 @@
 // A grid's way into the database: bands to payloads and errors, errors to records, records to tops, all in
 // one transaction.
-#define XXH_INLINE_ALL
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 
 #include "db/database_impl.h"
+#include "db/digest.h"
 #include "db/error.h"
 #include "db/patch_errors.h"
 #include "db/restate.h"
@@ -33,28 +32,6 @@ class Stopwatch {
 
  private:
   double start_ = now();
-};
-
-class DigestBuilder {
- public:
-  DigestBuilder() { XXH3_128bits_reset(state_); }
-  ~DigestBuilder() { XXH3_freeState(state_); }
-  DigestBuilder(const DigestBuilder&) = delete;
-  DigestBuilder& operator=(const DigestBuilder&) = delete;
-  template <class T>
-  void add(const T* data, std::size_t n) {
-    XXH3_128bits_update(state_, data, n * sizeof(T));
-  }
-  Digest get() const {
-    XXH128_canonical_t canonical;
-    XXH128_canonicalFromHash(&canonical, XXH3_128bits_digest(state_));
-    Digest d;
-    std::copy(std::begin(canonical.digest), std::end(canonical.digest), d.begin());
-    return d;
-  }
-
- private:
-  XXH3_state_t* state_ = XXH3_createState();
 };
 
 class MaskCells : public CellSource {
@@ -265,6 +242,7 @@ class Importer {
   }
 
   void make_records() {
+    ingest_->drop_coarse();
     grid_.patches = PatchRecords(shape().blocks());
     LazyTable<RecordRun>& runs = grid_.patches.runs();
     tbb::parallel_for(size_t(0), runs.size(), [&](std::size_t n) {

@@ -249,14 +249,13 @@ void Ingest::make_coarse() {
 
 // The vertices next to data continue them linearly, so that an interpolant's slope there is that of the data;
 // what lies deeper is the mean of its neighbours, ring by ring, then the mean of a neighbourhood.
-void Ingest::fill_holes(std::span<float> codes, std::span<const std::uint8_t> valid, int first,
-                        int rows) const {
-  const int w = shape_.width();
+void Ingest::fill_holes(Lattice& codes, std::span<const std::uint8_t> valid) const {
+  const int w = shape_.width(), first = codes.first(), rows = codes.count();
   std::vector<std::uint8_t> ring(valid.begin(), valid.end());  // 1: has a value
   const auto has = [&](int i, int j) {
     return i >= 0 && i < w && j >= 0 && j < rows && ring[size_t(j) * size_t(w) + size_t(i)];
   };
-  const auto at = [&](int i, int j) -> double { return codes[size_t(j) * size_t(w) + size_t(i)]; };
+  const auto at = [&](int i, int j) -> double { return codes.row(first + j)[i]; };
   std::vector<std::pair<std::size_t, float>> found;
   for (int sweep = 0; sweep < kFillRings; ++sweep) {
     found.clear();
@@ -273,12 +272,12 @@ void Ingest::fill_holes(std::span<float> codes, std::span<const std::uint8_t> va
           }
         if (count) found.emplace_back(size_t(j) * size_t(w) + size_t(i), float(std::nearbyint(sum / count)));
       }
-    for (const auto& [k, v] : found) codes[k] = v, ring[k] = 1;
+    for (const auto& [k, v] : found) codes.row(first + int(k / size_t(w)))[k % size_t(w)] = v, ring[k] = 1;
   }
   for (int j = 0; j < rows; ++j)
     for (int i = 0; i < w; ++i)
       if (!has(i, j))
-        codes[size_t(j) * size_t(w) + size_t(i)] =
+        codes.row(first + j)[i] =
             float(code_of(means_[size_t((first + j) / 8) * size_t(means_cols_) + size_t(i / 8)]));
 }
 
@@ -286,13 +285,13 @@ Ingest::Band Ingest::read_band(int y0, int y1) const {
   const int w = shape_.width(), first = std::max(0, y0 - kMargin),
             end = std::min(shape_.height(), y1 + kMargin);
   const std::size_t n = size_t(end - first) * size_t(w);
-  Buffer<float> codes(n);
+  Lattice codes(shape_, 0, first, end - first);  // level 0 is the samples themselves
   Band band{y0, y1, {}, {}};
   if (!masks_.empty()) band.valid.resize(n);
   const auto take = [&](int y, int rows, const auto* raw) {
     tbb::parallel_for(size_t(0), size_t(rows), [&](std::size_t r) {
       const std::size_t from = r * size_t(w), to = (size_t(y - first) + r) * size_t(w);
-      codes_of(raw + from, size_t(w), quantiser_.quantum, double(quantiser_.origin), codes.data() + to);
+      codes_of(raw + from, size_t(w), quantiser_.quantum, double(quantiser_.origin), codes.row(y + int(r)));
       if (band.valid.empty()) return;
       for (std::size_t k = 0; k < size_t(w); ++k) band.valid[to + k] = raw[from + k] == raw[from + k];
     });
@@ -303,15 +302,17 @@ Ingest::Band Ingest::read_band(int y0, int y1) const {
     read_strips<float>(first, end, take);
   else
     read_strips<double>(first, end, take);
-  if (!band.valid.empty()) fill_holes({codes.data(), n}, band.valid, first, end - first);
-  for (int l = 0; l < std::min(kStreamedLevels, shape_.levels()); ++l) {
+  if (!band.valid.empty()) fill_holes(codes, band.valid);
+  codes.extrapolate_ring();
+  band.levels.push_back(std::move(codes));
+  for (int l = 1; l < std::min(kStreamedLevels, shape_.levels()); ++l) {
     // Every level row whose samples are at hand; the one beyond the last sample needs the last and one
     // before.
     const int from = (first + (1 << l) - 1) >> l;
     const int to = end == shape_.height() ? shape_.lattice_rows(l) : ((end - 1) >> l) + 1;
-    band.levels.push_back(make_lattice(shape_, l, from, to - from, [&](int i, int j) {
-      return codes[size_t(j - first) * size_t(w) + size_t(i)];
-    }));
+    const Lattice& samples = band.levels.front();
+    Lattice made = make_lattice(shape_, l, from, to - from, [&](int i, int j) { return samples.row(j)[i]; });
+    band.levels.push_back(std::move(made));
   }
   return band;
 }

@@ -47,6 +47,8 @@ class Ingest {
     std::vector<Lattice> levels;      ///< 0, 1, 2 (as many as the grid has)
     std::vector<std::uint8_t> valid;  ///< of level 0's rows, width each; empty where the grid has no holes
   };
+  /// The coarse levels and what they were made of are no longer asked for.
+  void drop_coarse() { std::vector<Lattice>().swap(coarse_), kept_ = Buffer<float>(); }
   /// Rows of a band: a multiple of a payload chunk of the coarsest streamed level.
   int band_rows() const { return band_rows_; }
   Band read_band(int y0, int y1) const;
@@ -65,7 +67,7 @@ class Ingest {
   void make_coarse();
   double knot(int i, int j) const;
   double code_of(double raw) const;
-  void fill_holes(std::span<float> codes, std::span<const std::uint8_t> valid, int first, int rows) const;
+  void fill_holes(Lattice& codes, std::span<const std::uint8_t> valid) const;
 
   const RasterSource& source_;
   GridShape shape_;

@@ -52,6 +52,7 @@ class FileRows final : public Rows {
     const int flags = band_->GetMaskFlags();
     const bool computed = (flags & GMF_NODATA) && !(flags & GMF_PER_DATASET);
     if (!(flags & GMF_ALL_VALID) && !computed) mask_ = band_->GetMaskBand();
+    hold_a_row_of_blocks();
   }
   void read(int row, int rows, double* out) override { read_as(GDT_Float64, row, rows, out); }
   void read(int row, int rows, float* out) override { read_as(GDT_Float32, row, rows, out); }
@@ -75,6 +76,15 @@ class FileRows final : public Rows {
                   messages.explain("ends early or is damaged near rows " + std::to_string(row) + " to " +
                                    std::to_string(row + rows - 1)),
                   "get the file again");
+  }
+
+  // Strips are lower than blocks may be: without room for a row of them each would be decoded several times.
+  void hold_a_row_of_blocks() const {
+    int width = 0, height = 0;
+    band_->GetBlockSize(&width, &height);
+    const GIntBig row =
+        GIntBig(height) * (band_->GetXSize() + width) * GDALGetDataTypeSizeBytes(band_->GetRasterDataType());
+    if (GDALGetCacheMax64() < 2 * row) GDALSetCacheMax64(2 * row);
   }
 
   // Written as selections over whole arrays: compilers turn them into vector code.

@@ -13,7 +13,7 @@
 namespace {
 
 constexpr int kFailed = 1, kWrongUsage = 2;
-constexpr std::uint64_t kGdalShare = 16;  // of the memory setting: GDAL's blocks; files are read row by row
+constexpr std::uint64_t kGdalShare = 64;  // of the memory setting: GDAL's blocks; files are read row by row
 
 // Large blocks come and go: GDAL makes every tile of a file in memory that grows by a tenth at a time, an
 // import builds its levels band by band. With glibc's first thresholds each goes back to the system and

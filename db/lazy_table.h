@@ -1,6 +1,7 @@
 // A numbered table whose slots are read from the store when they are first asked for.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>

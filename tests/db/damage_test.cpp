@@ -1,7 +1,6 @@
 // Damaged files: a clear error or the true answer, never another one; and repairing what can be derived.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -10,6 +9,7 @@
 #include <random>
 
 #include "db/database.h"
+#include "tests/db/database_files.h"
 #include "tests/db/databases.h"
 #include "tests/grids.h"
 #include "tests/seed.h"
@@ -21,20 +21,8 @@ double rough(double x, double y) {
   return 40 * std::sin(x / 170) * std::cos(y / 130) + std::sin(x * 1.7 + y);
 }
 
-std::string contents(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 void write(const std::string& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary) << bytes;
-}
-
-void execute(const std::string& path, const std::string& sql) {
-  sqlite3* db = nullptr;
-  ASSERT_EQ(sqlite3_open(path.c_str(), &db), SQLITE_OK);
-  char* message = nullptr;
-  EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
-  sqlite3_close(db);
 }
 
 std::string two_grids(const GridFolder& folder) {

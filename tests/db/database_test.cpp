@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sqlite3.h>
 
 #include <algorithm>
 #include <fstream>
@@ -12,6 +11,7 @@
 #include <numeric>
 #include <random>
 
+#include "tests/db/database_files.h"
 #include "tests/db/databases.h"
 #include "tests/grids.h"
 #include "tests/seed.h"
@@ -21,20 +21,6 @@ namespace {
 
 double rough(double x, double y) {
   return 40 * std::sin(x / 170) * std::cos(y / 130) + 5 * std::sin(x / 21 + y / 37) + std::sin(x * 1.7 + y);
-}
-
-std::string contents(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-// Statements that no Patchwork would execute.
-void execute(const std::string& path, const std::string& sql) {
-  sqlite3* db = nullptr;
-  ASSERT_EQ(sqlite3_open(path.c_str(), &db), SQLITE_OK);
-  char* message = nullptr;
-  EXPECT_EQ(sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message), SQLITE_OK) << message;
-  sqlite3_close(db);
 }
 
 bool says(const std::string& text, const std::string& part) {

@@ -82,11 +82,20 @@ void Restate::add(Grid grid) {
 void Restate::remove(std::size_t place) {
   const Grid gone = std::move(db_.grids[place]);
   const Extent extent = gone.info.frame.bounds(gone.info.shape.footprint());
-  const double least = smallest_bottom(gone);
-  gone.patches.each([&](std::size_t k, const PatchRecord& p) {
-    effect_.removed += p.exists();
-    if (p.exists() && !p.dormant()) out_.push_back({lod_box(gone.info, k, p), gone.patch_id(k)});
-  });
+  double least = -std::numeric_limits<double>::infinity();
+  try {
+    gone.patches.each([&](std::size_t k, const PatchRecord& p) {
+      effect_.removed += p.exists();
+      if (p.exists() && !p.dormant()) out_.push_back({lod_box(gone.info, k, p), gone.patch_id(k)});
+    });
+    least = smallest_bottom(gone);
+  } catch (const Error&) {  // a grid with damaged records must be able to go: the tree knows its boxes
+    out_.clear();
+    db_.tree.traverse([](const LodBox&) { return true; },
+                      [&](const LodEntry& e) {
+                        if (e.id.grid() == gone.info.id) out_.push_back(e);
+                      });
+  }
   db_.grids.erase(db_.grids.begin() + std::ptrdiff_t(place));
   std::vector<PatchPlace> places = places_near(extent, kNone);
   std::erase_if(places, [&](const PatchPlace& at) {

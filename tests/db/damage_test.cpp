@@ -150,6 +150,19 @@ TEST(Check, NamesWhatIsDamagedAndRepairMakesWhatCanBeDerived) {
   says(checked(tail("records"), false), "a run of patch records is damaged");
 }
 
+TEST(Damage, AGridWithDamagedRecordsCanGo) {
+  const GridFolder folder;
+  const std::string path = two_grids(folder);
+  execute(path, "UPDATE records SET checksum = checksum + 1 WHERE id >= (2 << 48)");
+  EXPECT_FALSE(Database::open(path).check().empty());
+  Database db = Database::open_existing(path);
+  db.remove("fine");
+  EXPECT_TRUE(db.check().empty()) << problems(db.check());
+  Database never = folder.database("never");
+  folder.add(never, of_terrain({.width = 130, .height = 110, .accuracy = 1}, rough), "coarse");
+  EXPECT_EQ(db.content_hash(), never.content_hash());
+}
+
 TEST(Check, FindsAWrongTopAndRepairSetsItRight) {
   const GridFolder folder;
   const std::string path = two_grids(folder), truth = answer(path);

@@ -81,7 +81,7 @@ Ingest::Ingest(const RasterSource& source, std::size_t memory, double tolerance,
     if (masks_.at(shape_.levels() - 1, 0, 0) == 0 && shape_.levels() == 1 && shape_.width() == 2)
       throw Error(source.path(), "it holds no cell with data at all four corners");
   } else {
-    means_ = {};
+    std::vector<double>().swap(means_);  // `means_ = {}` would keep the memory, as would clear()
   }
   make_coarse();
 }
@@ -244,7 +244,7 @@ void Ingest::make_coarse() {
   for (int l = kStreamedLevels; l < shape_.levels(); ++l)
     coarse_.push_back(
         make_lattice(shape_, l, 0, shape_.lattice_rows(l), [&](int i, int j) { return knot(i, j); }));
-  knots_ = {};
+  std::vector<double>().swap(knots_);
 }
 
 // The vertices next to data continue them linearly, so that an interpolant's slope there is that of the data;

@@ -24,6 +24,13 @@ int segments(double last, int level) {
   return n;
 }
 
+// The blocks whose domain a segment lies in: two where it is a rim; the last one has all that is left.
+struct BlockSpan {
+  BlockSpan(int segment, int blocks)
+      : first(std::clamp((segment - 1) / 3, 0, blocks - 1)), last(std::min((segment + 1) / 3, blocks - 1)) {}
+  int first, last;
+};
+
 // On these levels errors are measured at every half cell too: there the interpolants bend most between two
 // samples.
 int per_cell(int level) { return level == 1 || level == 2 ? 2 : 1; }
@@ -216,7 +223,7 @@ PatchErrors::PatchErrors(const GridShape& shape, const CellMasks& cells) : shape
   const LatticeRect f = shape.footprint();
   for (int l = 0; l < shape.levels(); ++l) {
     const int ni = segments(f.i1, l), nj = segments(f.j1, l);
-    levels_.push_back({ni, nj, std::vector<Ninth>(size_t(ni) * size_t(nj))});
+    levels_.push_back({ni, nj, std::vector<Largest>(size_t(shape.blocks_i(l)) * size_t(shape.blocks_j(l)))});
   }
 }
 
@@ -321,36 +328,33 @@ void PatchErrors::measure(const Lattice& lattice, const Lattice& level0, std::sp
 void PatchErrors::note(int level, int segment, const Positions& positions, int p0, int p1,
                        const double* linear, const double* smooth) {
   Level& out = levels_[size_t(level)];
+  const int across = shape_.blocks_i(level);
+  const BlockSpan rows(segment, shape_.blocks_j(level));
   const std::lock_guard lock(mutex_);
   for (int i = 0; i < out.ni; ++i) {
     const int a = i == 0 ? 0 : positions.place(segment_start(i, level));
     const int b = std::min(positions.place(segment_start(i + 1, level)), positions.n - 1);
-    Ninth& ninth = out.ninths[size_t(segment) * size_t(out.ni) + size_t(i)];
     double worst = 0, worst_smooth = 0;
     for (int p = std::max(a, p0); p <= std::min(b, p1 - 1); ++p)
       worst = std::max(worst, linear[p - p0]), worst_smooth = std::max(worst_smooth, smooth[p - p0]);
-    ninth.linear = std::max(ninth.linear, rounded_up(worst));
-    ninth.smooth = std::max(ninth.smooth, rounded_up(worst_smooth));
+    const BlockSpan cols(i, across);
+    for (int by = rows.first; by <= rows.last; ++by)
+      for (int bx = cols.first; bx <= cols.last; ++bx) {
+        Largest& block = out.blocks[size_t(by) * size_t(across) + size_t(bx)];
+        block.linear = std::max(block.linear, rounded_up(worst));
+        block.smooth = std::max(block.smooth, rounded_up(worst_smooth));
+      }
   }
 }
 
 std::array<double, 3> PatchErrors::of(int level, int bx, int by) const {
-  const Level& l = levels_[size_t(level)];
-  float linear = 0, smooth = 0;
-  // Five segments; behind the last block all that is left.
-  const auto end = [](int b, int blocks, int segments) {
-    return b + 1 == blocks ? segments : std::min(segments, 3 * b + 4);
-  };
-  for (int s = std::max(0, 3 * by - 1); s < end(by, shape_.blocks_j(level), l.nj); ++s)
-    for (int i = std::max(0, 3 * bx - 1); i < end(bx, shape_.blocks_i(level), l.ni); ++i) {
-      const Ninth& n = l.ninths[size_t(s) * size_t(l.ni) + size_t(i)];
-      linear = std::max(linear, n.linear), smooth = std::max(smooth, n.smooth);
-    }
+  const Largest& block =
+      levels_[size_t(level)].blocks[size_t(by) * size_t(shape_.blocks_i(level)) + size_t(bx)];
   const auto counted = [](double e) {
     const double tiny = std::ldexp(1, -30);
     return e <= tiny ? 0 : e * (1 + 1e-12) + tiny;
   };
-  return {counted(double(linear)), counted(double(smooth)), counted(double(smooth))};
+  return {counted(double(block.linear)), counted(double(block.smooth)), counted(double(block.smooth))};
 }
 
 }  // namespace patchwork

@@ -43,12 +43,12 @@ class PatchErrors {
 
  private:
   class Strip;
-  struct Ninth {                   // a ninth of a block: rim, middle, rim along each axis
+  struct Largest {
     float linear = 0, smooth = 0;  // rounded up
   };
   struct Level {
-    int ni, nj;
-    std::vector<Ninth> ninths;
+    int ni, nj;                   // segments along each axis (patch_errors.cpp)
+    std::vector<Largest> blocks;  // row by row: segments kept apart took nine times the memory
   };
   void note(int level, int segment, const Positions& positions, int p0, int p1, const double* linear,
             const double* smooth);

@@ -22,11 +22,12 @@ class Buffer {
   /// Throws std::bad_alloc.
   explicit Buffer(std::size_t n) : size_(n) {
     if (n == 0) return;
-    constexpr std::size_t page = std::size_t{2} << 20;
+    const std::size_t page = n * sizeof(T) < kHugePage ? kCacheLine : kHugePage;
     const std::size_t bytes = (n * sizeof(T) + page - 1) / page * page;
     data_.reset(static_cast<T*>(std::aligned_alloc(page, bytes)));
     if (!data_) throw std::bad_alloc();
-    madvise(data_.get(), bytes, MADV_HUGEPAGE);  // advice: without it all works, slower
+    if (page == kHugePage)
+      madvise(data_.get(), bytes, MADV_HUGEPAGE);  // advice: without it all works, slower
   }
   T* data() { return data_.get(); }
   const T* data() const { return data_.get(); }
@@ -36,6 +37,8 @@ class Buffer {
   const T& operator[](std::size_t k) const { return data_.get()[k]; }
 
  private:
+  static constexpr std::size_t kCacheLine = 64;
+  static constexpr std::size_t kHugePage = std::size_t{2} << 20;  // less would waste the rest of one
   struct Free {
     void operator()(T* p) const { std::free(p); }
   };

@@ -73,16 +73,15 @@ void tile(std::span<Tile> tiles, std::size_t pages, Done& done) {
 
 LodTree::LodTree() { root_ = add_page(LodPage(0)); }
 
-LodTree LodTree::build(const std::vector<Entry>& entries) {
+LodTree LodTree::build(std::vector<Entry> entries) {
   LodTree tree;
   if (entries.empty()) return tree;
   tree.release(tree.root_);
-  std::vector<Entry> level_entries = entries;
-  std::uint32_t level = 0;
-  do level_entries = tree.pack(level_entries, level++);
-  while (level_entries.size() > 1);
-  tree.root_ = std::uint32_t(level_entries[0].id.value);
   tree.size_ = entries.size();
+  std::uint32_t level = 0;
+  do entries = tree.pack(entries, level++);
+  while (entries.size() > 1);
+  tree.root_ = std::uint32_t(entries[0].id.value);
   return tree;
 }
 
@@ -221,7 +220,7 @@ void LodTree::repack() {
   std::vector<Entry> entries;
   entries.reserve(size_);
   traverse([](const LodBox&) { return true; }, [&](const Entry& e) { entries.push_back(e); });
-  LodTree packed = build(entries);
+  LodTree packed = build(std::move(entries));
   packed.replaces(*this);
   *this = std::move(packed);
 }

@@ -36,7 +36,7 @@ class LodTree {
 
   LodTree();
   /// The same tree, page by page, for the same entries in the same order.
-  static LodTree build(const std::vector<Entry>& entries);
+  static LodTree build(std::vector<Entry> entries);
   /// From what `header_bytes` and `page_bytes` gave; takes as long for a small tree as for a large one.
   /// Throws Error if the header is none; every later call does where it meets a page that is none.
   static LodTree open(std::span<const std::byte> header, const ReadPage& read);

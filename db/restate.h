@@ -32,9 +32,10 @@ class Restate {
 
  private:
   std::vector<PatchPlace> places_near(const Extent& extent, std::size_t all_of) const;
-  std::size_t evaluate(const std::vector<PatchPlace>& places, std::size_t added);
+  std::size_t evaluate(std::vector<PatchPlace> places, std::size_t added);
   void note(const PatchRecord& before, const PatchRecord& after);
   void change_tree();
+  void forget_lists();
 
   Database::Impl& db_;
   Effect effect_;
@@ -42,7 +43,7 @@ class Restate {
   bool rebuilt_ = false;
 };
 
-/// Entries of the R-tree as the records have them.
-std::vector<LodEntry> live_entries(std::span<const Grid> grids);
+/// Entries of the R-tree as the records have them; room for `about` as many is made beforehand.
+std::vector<LodEntry> live_entries(std::span<const Grid> grids, std::size_t about = 0);
 
 }  // namespace patchwork

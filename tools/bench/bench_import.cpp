@@ -1,6 +1,8 @@
 // Building levels from one grid: ours beside GDAL's Cloud Optimized GeoTIFF.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "tools/bench/bench.h"
 #include "tools/bench/process.h"
 
@@ -21,19 +23,25 @@ struct Figures {
 class ImportBench {
  public:
   explicit ImportBench(const BenchOptions& o) : o_(o), folder_(o) {
-    const Json terrain = make_terrain(
-        folder_.path("terrain"), {"--size", std::to_string(o.size), "--type", "Int16", "--scale", "0.1"});
-    accuracy_ = terrain["files"][0]["accuracy"];
-    source_ = folder_.path("terrain/base.tif");
+    accuracy_ = make("terrain", o.size)["files"][0]["accuracy"];
+    make("quarter", std::max(2, (o.size - 1) / 4 + 1));
+    source_ = folder_.path("terrain/base.tif"), quarter_ = folder_.path("quarter/base.tif");
   }
 
   std::vector<Work> run() {
-    ours(), peer();
-    for (int r = 0; r < o_.runs; ++r) add_ours(ours()), peer_.add(peer(), bytes_a_sample(cog()));
+    ours(source_), peer();
+    for (int r = 0; r < o_.runs; ++r) {
+      const double quarter = ours(quarter_).peak_mib;
+      add_ours(ours(source_), quarter), peer_.add(peer(), bytes_a_sample(cog()));
+    }
     return works();
   }
 
  private:
+  Json make(const std::string& name, int size) const {
+    return make_terrain(folder_.path(name),
+                        {"--size", std::to_string(size), "--type", "Int16", "--scale", "0.1"});
+  }
   std::string database() const { return folder_.path("new.pwk"); }
   std::string cog() const { return folder_.path("out.tif"); }
   double samples() const { return double(o_.size) * o_.size; }
@@ -41,9 +49,9 @@ class ImportBench {
     return double(std::filesystem::file_size(file)) / samples();
   }
 
-  ProcessUse ours() {
+  ProcessUse ours(const std::string& source) {
     for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(database() + suffix);
-    return run_process({own_program("patchwork"), "import", database(), source_, "--accuracy",
+    return run_process({own_program("patchwork"), "import", database(), source, "--accuracy",
                         fmt::format("{}", accuracy_), "--threads", std::to_string(o_.threads), "--quiet",
                         "--json"});
   }
@@ -53,8 +61,9 @@ class ImportBench {
                         "NUM_THREADS=" + std::to_string(o_.threads), "-co", "OVERVIEWS=AUTO", source_, cog()},
                        "gdal-bin");
   }
-  void add_ours(const ProcessUse& use) {
+  void add_ours(const ProcessUse& use, double quarter_mib) {
     ours_.add(use, bytes_a_sample(database()));
+    growth_.push_back(use.peak_mib / quarter_mib);
     report_ = Json::parse(use.output)["grids"][0];
     errors_.push_back(double(report_["stages"]["errors"]) * o_.threads);
   }
@@ -73,6 +82,12 @@ class ImportBench {
              Spread::of(ours_.peak_mib),
              {{kPeer, Spread::of(peer_.peak_mib)}},
              answer},
+            {what + ", peak memory over that of a quarter of its side",
+             "ratio",
+             true,
+             Spread::of(growth_),
+             {},
+             answer},
             {what + ", file",
              "bytes/sample",
              true,
@@ -85,9 +100,9 @@ class ImportBench {
   const BenchOptions& o_;
   WorkFolder folder_;
   double accuracy_ = 0;
-  std::string source_;
+  std::string source_, quarter_;  // a quarter: along each side
   Figures ours_, peer_;
-  std::vector<double> errors_;
+  std::vector<double> errors_, growth_;
   Json report_;
 };
 

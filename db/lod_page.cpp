@@ -142,6 +142,11 @@ PATCHWORK_VECTORIZED void keep_region(const LodPage& p, const Extent& region, st
     hit[s] = std::uint8_t(hit[s] & (p.xmin[s] <= region.xmax) & (region.xmin <= p.xmax[s]) &
                           (p.ymin[s] <= region.ymax) & (region.ymin <= p.ymax[s]));
 }
+PATCHWORK_VECTORIZED void keep_inside(const LodPage& p, const Extent& region, std::uint8_t* __restrict hit) {
+  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s)
+    hit[s] = std::uint8_t(hit[s] & (p.xmax[s] <= region.xmax) & (region.xmin <= p.xmin[s]) &
+                          (p.ymax[s] <= region.ymax) & (region.ymin <= p.ymin[s]));
+}
 
 template <class T>
 void put(std::vector<std::byte>& out, T value) {
@@ -223,12 +228,18 @@ LodBox LodPage::bounds() const {
   return all;
 }
 
-std::uint64_t LodPage::uniform_hits(const Extent& region, float error) const {
+LodHits LodPage::uniform_hits(const Extent& region, float error, bool in) const {
   std::uint8_t hit[kSlots];
   keep_error(bottom, top, error, hit);
-  if (mask_of_used(hit) == 0) return 0;
+  LodHits hits{mask_of_used(hit)};
+  if (in) hits.inside = hits.met;
+  if (in || hits.met == 0) return hits;
   keep_region(*this, region, hit);
-  return mask_of_used(hit);
+  hits.met = mask_of_used(hit);
+  if (level == 0) return hits;
+  keep_inside(*this, region, hit);
+  hits.inside = mask_of_used(hit);
+  return hits;
 }
 
 std::uint64_t LodPage::mask_of_used(const std::uint8_t (&hit)[kSlots]) const {

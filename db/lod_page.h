@@ -38,6 +38,12 @@ float error_octaves(float error);
 /// The largest float that is not above `error`.
 float float_at_most(double error);
 
+/// What a cut makes of a page: bit s is set in `met` if box s can belong to the answer, in `inside` if it
+/// lies in the region as a whole, so that what is below it need not be asked where it lies.
+struct LodHits {
+  std::uint64_t met = 0, inside = 0;
+};
+
 /// Slots [0, count) are in use. In a leaf (level 0) an entry's id is a patch, elsewhere the index of a page.
 struct LodPage {
   static constexpr std::uint32_t kSlots = 64;     ///< a visit keeps its hits in one 64-bit mask
@@ -60,8 +66,8 @@ struct LodPage {
 
   /// Bit s is hit[s] (0 or 1) of the slots in use.
   std::uint64_t mask_of_used(const std::uint8_t (&hit)[kSlots]) const;
-  /// Bit s is set if box s meets the closed region and bottom <= error < top.
-  std::uint64_t uniform_hits(const Extent& region, float error) const;
+  /// The boxes that meet the closed region with bottom <= error < top; `in`: all are inside the region.
+  LodHits uniform_hits(const Extent& region, float error, bool in) const;
   /// The box that grows least (volume, errors in octaves) when `box` joins it; ties by the smaller volume.
   std::uint32_t choose_slot(const LodBox& box) const;
   /// Keeps one part of its entries and `extra`, returns the other part. REQUIRES: count == kSlots.

@@ -52,10 +52,11 @@ class LodTree {
   /// REQUIRES: a box that contains an accepted box is accepted. CAVEAT: `emit` must not change the tree.
   template <class Meets, class Emit>
   VisitCost traverse(Meets meets, Emit emit) const {
-    return walk([&](const LodPage& page) { return hits(page, meets); }, emit);
+    return walk([&](const LodPage& page, bool) { return LodHits{hits(page, meets)}; }, emit);
   }
 
-  /// The same with hits(const LodPage&) -> mask of accepted slots, a page at a time.
+  /// The same with hits(const LodPage&, bool inside) -> LodHits, a page at a time; `inside` is what it said
+  /// of the page's own box.
   template <class Hits, class Emit>
   VisitCost visit(Hits hits, Emit emit) const {
     return walk(hits, emit);
@@ -64,7 +65,7 @@ class LodTree {
   template <class Emit>
   VisitCost visit_uniform(const Extent& region, double error, Emit emit) const {
     const float limit = float_at_most(error);
-    return walk([&](const LodPage& page) { return page.uniform_hits(region, limit); }, emit);
+    return walk([&](const LodPage& page, bool in) { return page.uniform_hits(region, limit, in); }, emit);
   }
 
   /// Pages written since the last call (or since the tree began), ascending, and those given up since.
@@ -130,30 +131,31 @@ template <class Hits, class Emit>
 VisitCost LodTree::walk(Hits hits, Emit& emit) const {
   struct Level {
     const LodPage* page;
-    std::uint64_t left;
+    LodHits left;
   } stack[kMaxHeight];
   VisitCost cost;
   std::uint32_t depth = 0;
-  const auto enter = [&](const LodPage& page) {
+  const auto enter = [&](const LodPage& page, bool inside) {
     ++cost.nodes, cost.boxes += page.count;
-    std::uint64_t left = hits(page);
+    const LodHits found = hits(page, inside);
     if (page.level > 0) {
       if (depth == kMaxHeight) refuse("its pages form a ring");
-      stack[depth++] = {&page, left};
+      stack[depth++] = {&page, found};
     } else {
-      for (; left; left &= left - 1) emit(page.entry(std::uint32_t(std::countr_zero(left))));
+      for (std::uint64_t left = found.met; left; left &= left - 1)
+        emit(page.entry(std::uint32_t(std::countr_zero(left))));
     }
   };
-  enter(pages_[root_]);
+  enter(pages_[root_], false);
   while (depth > 0) {
     Level& top = stack[depth - 1];
-    if (top.left == 0) {
+    if (top.left.met == 0) {
       --depth;
       continue;
     }
-    const auto slot = std::uint32_t(std::countr_zero(top.left));
-    top.left &= top.left - 1;
-    enter(pages_[top.page->child(slot)]);
+    const auto slot = std::uint32_t(std::countr_zero(top.left.met));
+    top.left.met &= top.left.met - 1;
+    enter(pages_[top.page->child(slot)], top.left.inside >> slot & 1);
   }
   return cost;
 }

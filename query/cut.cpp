@@ -23,8 +23,8 @@ class UniformSurface : public CutSurface {
   double at(Point) const override { return cut_.error; }
   ToleranceRange over(const Frame&, const LatticeRect&) const override { return {cut_.error, cut_.error}; }
   bool meets(const Grid& g, const GridShape::Block& b) const override { return cut_.region.meets(g, b); }
-  std::uint64_t hits(const LodPage& page) const override {
-    return page.uniform_hits(cut_.region.bounds(), limit_);
+  LodHits hits(const LodPage& page, bool inside) const override {
+    return page.uniform_hits(cut_.region.bounds(), limit_, inside);
   }
 
  private:
@@ -142,14 +142,13 @@ class ViewSurface : public CutSurface {
     return seen.i0 <= d.i1 && d.i0 <= seen.i1 && seen.j0 <= d.j1 && d.j0 <= seen.j1;
   }
 
-  std::uint64_t hits(const LodPage& page) const override {
-    if (sides_.empty()) return 0;
+  LodHits hits(const LodPage& page, bool) const override {
+    if (sides_.empty()) return {};
     std::uint8_t hit[LodPage::kSlots];
     near_enough(page, eye_, slope_ * slope_, bounds_, hit);
-    const std::uint64_t near = page.mask_of_used(hit);
-    if (near == 0) return 0;
+    if (page.mask_of_used(hit) == 0) return {};
     for (const Side& side : sides_) keep_inside(page, side, hit);
-    return page.mask_of_used(hit);
+    return {page.mask_of_used(hit)};
   }
 
  private:
@@ -178,7 +177,7 @@ class CorridorSurface : public CutSurface {
     return around({0.5 * (a.x + b.x), 0.5 * (a.y + b.y)}, 0.5 * std::hypot(b.x - a.x, b.y - a.y));
   }
   bool meets(const Grid& g, const GridShape::Block& b) const override { return cut_.region.meets(g, b); }
-  std::uint64_t hits(const LodPage& page) const override {
+  LodHits hits(const LodPage& page, bool) const override {
     std::uint8_t hit[LodPage::kSlots] = {};
     const Extent& region = cut_.region.bounds();
     for (std::uint32_t s = 0; s < page.count; ++s) {
@@ -188,7 +187,7 @@ class CorridorSurface : public CutSurface {
                                       0.5 * std::hypot(b.xmax - b.xmin, b.ymax - b.ymin));
       hit[s] = double(b.bottom) <= r.high && r.low < double(b.top);
     }
-    return page.mask_of_used(hit);
+    return {page.mask_of_used(hit)};
   }
 
  private:

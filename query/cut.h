@@ -23,8 +23,9 @@ class CutSurface {
   virtual double at(Point p) const = 0;  ///< metres
   virtual ToleranceRange over(const Frame& frame, const LatticeRect& rect) const = 0;
   virtual bool meets(const Grid& grid, const GridShape::Block& block) const = 0;  ///< its domain the region
-  /// Bit s is set if box s of the page can belong to the answer; never too few. No allocation.
-  virtual std::uint64_t hits(const LodPage& page) const = 0;
+  /// The boxes of a page that can belong to the answer, never too few; `inside`: the page's box was said to
+  /// lie in the region. No allocation.
+  virtual LodHits hits(const LodPage& page, bool inside) const = 0;
 };
 
 /// A uniform cut: e(x, y) = error over the region.

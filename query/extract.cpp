@@ -60,7 +60,8 @@ Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
     found.push_back({p.bottom, &grid, index, e.id});
     largest_asked = std::max(largest_asked, asked.high);
   };
-  const VisitCost visited = db.tree().visit([&](const LodPage& page) { return cut.hits(page); }, emit);
+  const VisitCost visited =
+      db.tree().visit([&](const LodPage& page, bool inside) { return cut.hits(page, inside); }, emit);
   sort_by_priority(found);
   for (const Found& f : found) {
     result.patches.push_back(f.id);

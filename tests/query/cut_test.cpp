@@ -84,7 +84,7 @@ struct AsGrid {
 void expect_no_box_missed(const LodTree& tree, const std::vector<LodEntry>& all, const CutSurface& cut,
                           std::size_t& found, std::size_t& spare) {
   std::set<std::uint64_t> hit;
-  tree.visit([&](const LodPage& page) { return cut.hits(page); },
+  tree.visit([&](const LodPage& page, bool inside) { return cut.hits(page, inside); },
              [&](const LodEntry& e) { hit.insert(e.id.value); });
   std::size_t exact = 0;
   for (const LodEntry& e : all) {

@@ -52,7 +52,7 @@ class Ours : public Index {
  public:
   explicit Ours(const Boxes& boxes) : tree_(LodTree::build(boxes)) {}
   void find(const Question& q, Ids& ids) const override {
-    cost_ = tree_.visit([&](const LodPage& page) { return q.cut->hits(page); },
+    cost_ = tree_.visit([&](const LodPage& page, bool inside) { return q.cut->hits(page, inside); },
                         [&](const LodEntry& e) { ids.push_back(e.id.value); });
   }
   const VisitCost& cost() const { return cost_; }
@@ -74,7 +74,7 @@ class Scan : public Index {
   }
   void find(const Question& q, Ids& ids) const override {
     for (const LodPage& page : pages_)
-      for (std::uint64_t left = q.cut->hits(page); left; left &= left - 1)
+      for (std::uint64_t left = q.cut->hits(page, false).met; left; left &= left - 1)
         ids.push_back(page.ref[std::countr_zero(left)]);
   }
 

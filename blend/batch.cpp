@@ -61,16 +61,6 @@ double hole_factor(const PatchSurface::Holes& h, double u, double v, int smoothn
 
 }  // namespace
 
-LatticeRect Blend::Placed::window_bounds(const Point corners[4]) const {
-  LatticeRect r{INFINITY, INFINITY, -INFINITY, -INFINITY};
-  for (int k = 0; k < 4; ++k) {
-    const double dx = corners[k].x - x0, dy = corners[k].y - y0;
-    const double u = (ua * dx + ub * dy) - first_i, v = (va * dx + vb * dy) - first_j;
-    r = {std::min(r.i0, u), std::min(r.j0, v), std::max(r.i1, u), std::max(r.j1, v)};
-  }
-  return r;
-}
-
 Batch::Batch() {
   for (auto* a : {&height, &bound, &rest_, &sum_, &low_, &high_, &worst_, &most_}) a->resize(kPoints);
   for (auto* a : {&left_at_, &reads_, &touched_}) a->resize(kPoints);

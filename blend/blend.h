@@ -45,18 +45,29 @@ struct RasterFrame {
   double x0 = 0, xc = 1, xr = 0, y0 = 0, yc = 0, yr = 1;
 };
 
+/// Whatever evaluates the surface: Blend on the CPU, VulkanBlend on a graphics card.
+class Evaluator {
+ public:
+  virtual ~Evaluator() = default;
+  /// Any number of points in any order. Points that are not finite have no data.
+  virtual BlendCounts at_points(std::span<const double> x, std::span<const double> y,
+                                const BlendOutput& out) const = 0;
+  /// Pixels [0, width) x [row, row + rows), row-major.
+  virtual BlendCounts at_pixels(const RasterFrame& raster, int width, int row, int rows,
+                                const BlendOutput& out) const = 0;
+};
+
 /// REQUIRES: `db` outlives it. Evaluation is safe from many threads and uses all of them; its bits depend on
 /// the data and the point alone. Throws Error for damaged payloads.
-class Blend {
+class Blend : public Evaluator {
  public:
   /// `patches` in the order of Extraction::patches.
   Blend(const Database& db, std::span<const PatchId> patches, const BlendOptions& options);
 
-  /// Any number of points in any order. Points that are not finite have no data.
-  BlendCounts at_points(std::span<const double> x, std::span<const double> y, const BlendOutput& out) const;
-  /// Pixels [0, width) x [row, row + rows), row-major.
+  BlendCounts at_points(std::span<const double> x, std::span<const double> y,
+                        const BlendOutput& out) const override;
   BlendCounts at_pixels(const RasterFrame& raster, int width, int row, int rows,
-                        const BlendOutput& out) const;
+                        const BlendOutput& out) const override;
 
   struct Placed;  ///< a patch with its map from the domain (blend.cpp, batch.cpp)
 

@@ -1,0 +1,146 @@
+#include "blend/vulkan/patch_pool.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_set>
+
+#include "blend/placed.h"
+#include "blend/vulkan/patch_pool_impl.h"
+#include "db/error.h"
+
+namespace patchwork {
+
+namespace {
+
+constexpr std::size_t kSamples = PatchSurface::kSide * PatchSurface::kSide;
+constexpr VkDeviceSize kRingBytes = VkDeviceSize{8} << 20;
+
+template <class T>
+void put(T (&to)[4], const LatticeRect& r) {
+  to[0] = T(r.i0), to[1] = T(r.j0), to[2] = T(r.i1), to[3] = T(r.j1);
+}
+
+PatchRecord32 record32(const Blend::Placed& p, const PatchRecord& facts, const PatchPool::Resident& r,
+                       float origin) {
+  PatchRecord32 out{};
+  put(out.kernel, p.kernel), put(out.ramp, p.ramp), put(out.domain, p.domain), put(out.samples, p.samples);
+  out.slope[0] = float(1 / (p.kernel.i0 - p.ramp.i0)), out.slope[1] = float(1 / (p.kernel.j0 - p.ramp.j0));
+  out.slope[2] = float(1 / (p.ramp.i1 - p.kernel.i1)), out.slope[3] = float(1 / (p.ramp.j1 - p.kernel.j1));
+  out.quantum = float(p.quantum), out.origin = origin, out.volume = float(p.volume), out.rim = float(p.rim);
+  std::copy(facts.error.begin(), facts.error.end(), out.error);
+  out.holes = r.holes ? float(*r.holes) : -1;
+  // 0 means that nothing answers, and the sign that a cell was filled.
+  out.grid = float(p.id.grid().value + 1), out.solid = !p.ragged && p.kernel_is_sampled();
+  out.turn[0] = float(p.ua), out.turn[1] = float(p.ub), out.turn[2] = float(p.va), out.turn[3] = float(p.vb);
+  return out;
+}
+
+PatchRecord64 record64(const Blend::Placed& p, const PatchRecord& facts) {
+  PatchRecord64 out{};
+  out.x0 = p.x0, out.y0 = p.y0, out.ua = p.ua, out.ub = p.ub, out.va = p.va, out.vb = p.vb;
+  out.first_i = p.first_i, out.first_j = p.first_j;
+  put(out.kernel, p.kernel), put(out.ramp, p.ramp), put(out.domain, p.domain), put(out.samples, p.samples);
+  out.quantum = p.quantum, out.base = p.base, out.origin = p.origin, out.volume = p.volume, out.rim = p.rim;
+  std::copy(facts.error.begin(), facts.error.end(), out.error);
+  return out;
+}
+
+// holes.glsl says what a word holds.
+std::vector<std::uint32_t> words_of(const PatchSurface::Holes& h) {
+  std::vector<std::uint32_t> words(kSamples);
+  for (std::size_t k = 0; k < kSamples; ++k)
+    words[k] = std::uint32_t(h.answering[k] != 0) | std::uint32_t(h.real[k] != 0) << 1 |
+               std::uint32_t{h.near[k]} << 8 | std::uint32_t{h.wide[k]} << 16;
+  return words;
+}
+
+std::unique_ptr<PatchPool::Impl> make_impl(std::shared_ptr<Device> device, std::size_t slots) {
+  const Device::Impl& d = device->impl();
+  const auto buffer = [&](std::size_t bytes, VkBufferUsageFlags usage) {
+    return vk::Buffer(d, slots * bytes, usage, vk::Where::card);
+  };
+  vk::Buffer samples = buffer(4 * kSamples, VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT);
+  vk::Buffer records = buffer(sizeof(PatchRecord32), VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT);
+  vk::Buffer exact = buffer(sizeof(PatchRecord64), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT);
+  vk::OwnedView sample_texels = vk::texels(d, samples, VK_FORMAT_R32_SFLOAT);
+  vk::OwnedView word_texels = vk::texels(d, samples, VK_FORMAT_R32_UINT);
+  vk::OwnedView record_texels = vk::texels(d, records, VK_FORMAT_R32G32B32A32_SFLOAT);
+  return std::unique_ptr<PatchPool::Impl>(new PatchPool::Impl{
+      std::move(device), std::move(samples), std::move(records), std::move(exact), std::move(sample_texels),
+      std::move(word_texels), std::move(record_texels), vk::UploadRing(d, kRingBytes)});
+}
+
+}  // namespace
+
+PatchPool::PatchPool(std::shared_ptr<Device> device, const Database& db, std::size_t slots)
+    : db_(db), slots_(std::max<std::size_t>(slots, 2)) {
+  if (slots_ > device->most_patches())
+    throw Error(device->name(),
+                "a pool of " + std::to_string(slots_) + " patches is more than it can address",
+                "ask for a smaller extent or a larger error");
+  impl_ = make_impl(std::move(device), slots_);
+  for (std::size_t s = slots_; s-- > 0;) free_.push_back(std::uint32_t(s));
+}
+
+PatchPool::~PatchPool() = default;
+
+std::size_t PatchPool::bytes_of(const Resident& r) {
+  return (r.holes ? 2 : 1) * 4 * kSamples + sizeof(PatchRecord32) + sizeof(PatchRecord64);
+}
+
+void PatchPool::hold(std::span<const PatchId> patches) {
+  drop_others(patches);
+  for (const PatchId id : patches)
+    if (!residents_.contains(id)) add(id);
+  impl_->ring.flush();
+}
+
+void PatchPool::drop_others(std::span<const PatchId> patches) {
+  std::vector<PatchId> kept(patches.begin(), patches.end());
+  std::sort(kept.begin(), kept.end());
+  std::erase_if(residents_, [&](const auto& resident) {
+    if (std::binary_search(kept.begin(), kept.end(), resident.first)) return false;
+    free_.push_back(resident.second.slot);
+    if (resident.second.holes) free_.push_back(*resident.second.holes);
+    ++traffic_.dropped;
+    return true;
+  });
+}
+
+void PatchPool::require(std::size_t slots) const {
+  if (free_.size() < slots)
+    throw Error(impl_->device->name(), "the patches do not fit into its pool of " + std::to_string(slots_),
+                "ask for a smaller extent or a larger error, or give it more memory");
+}
+
+std::uint32_t PatchPool::take_slot() {
+  const std::uint32_t slot = free_.back();
+  free_.pop_back();
+  return slot;
+}
+
+void PatchPool::add(PatchId id) {
+  const std::shared_ptr<const PatchSurface> surface = db_.surface(id);
+  require(surface->holes ? 2 : 1);
+  const Blend::Placed placed = place(db_, id, 0);
+  const PatchRecord facts = db_.patch(id);
+  const float origin = surface->codes[kSamples / 2];
+  Resident r{.slot = take_slot(), .height = placed.quantum * (placed.origin + double(origin)) + placed.base};
+  const auto send = [&](const vk::Buffer& to, std::uint32_t slot, const auto& items) {
+    const auto bytes = std::as_bytes(std::span(items));
+    impl_->ring.write(to, VkDeviceSize{slot} * bytes.size(), bytes);
+  };
+  send(impl_->samples, r.slot, surface->codes);
+  if (surface->holes) {
+    r.holes = take_slot();
+    send(impl_->samples, *r.holes, words_of(*surface->holes));
+  }
+  const PatchRecord32 record[] = {record32(placed, facts, r, origin)};
+  const PatchRecord64 exact[] = {record64(placed, facts)};
+  send(impl_->records, r.slot, record);
+  send(impl_->exact, r.slot, exact);
+  residents_.emplace(id, r);
+  ++traffic_.sent, traffic_.bytes += bytes_of(r);
+}
+
+}  // namespace patchwork

@@ -1,0 +1,71 @@
+// Patches resident on the card: what a cut keeps stays where it is, what it adds is sent once.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "blend/vulkan/device.h"
+#include "db/database.h"
+
+namespace patchwork {
+
+/// A slot holds the samples of a patch; its holes, where it has any, take another one. Not safe for
+/// concurrent use.
+class PatchPool {
+ public:
+  /// What a slot takes on the card: samples and the two records.
+  static constexpr std::size_t kSlotBytes = PatchSurface::kSide * PatchSurface::kSide * 4 + 9 * 16 + 32 * 8;
+
+  struct Resident {
+    std::uint32_t slot = 0;
+    std::optional<std::uint32_t> holes = {};  ///< slot
+    double height = 0;                        ///< metres: of the code that the shader's codes are relative to
+  };
+  /// Since the pool was made.
+  struct Traffic {
+    std::uint64_t sent = 0, dropped = 0;  ///< patches
+    std::uint64_t bytes = 0;              ///< sent
+    bool operator==(const Traffic&) const = default;
+  };
+
+  /// REQUIRES: `db` outlives it. Throws Error: the card has no memory for so many slots.
+  PatchPool(std::shared_ptr<Device> device, const Database& db, std::size_t slots);
+  ~PatchPool();
+
+  /// Drops what is not among `patches` and sends what is not there. Throws Error: they do not fit (those that
+  /// did are resident), damaged payloads. CAVEAT: ids name patches of one state of the database; hold({})
+  /// after it moved to another one.
+  void hold(std::span<const PatchId> patches);
+
+  const Resident& at(PatchId id) const { return residents_.at(id); }
+  const std::map<PatchId, Resident>& residents() const { return residents_; }
+  const Traffic& traffic() const { return traffic_; }
+  std::size_t slots() const { return slots_; }
+  /// Slots that a patch may need, before its heights are read.
+  static std::size_t slots_of(const Database& db, PatchId id) { return db.patch(id).ragged() ? 2 : 1; }
+  /// Bytes that a patch is sent with.
+  static std::size_t bytes_of(const Resident& r);
+
+  struct Impl;  ///< patch_pool_impl.h
+  const Impl& impl() const { return *impl_; }
+
+ private:
+  void add(PatchId id);
+  void drop_others(std::span<const PatchId> patches);
+  void require(std::size_t slots) const;
+  std::uint32_t take_slot();
+
+  const Database& db_;
+  std::size_t slots_;
+  std::unique_ptr<Impl> impl_;
+  std::map<PatchId, Resident> residents_;
+  std::vector<std::uint32_t> free_;
+  Traffic traffic_;
+};
+
+}  // namespace patchwork

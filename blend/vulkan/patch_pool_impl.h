@@ -1,0 +1,35 @@
+// The pool's buffers, as shaders see them.
+#pragma once
+
+#include "blend/vulkan/buffer_impl.h"
+#include "blend/vulkan/patch_pool.h"
+
+namespace patchwork {
+
+/// A slot's numbers in float32, texels of common.glsl's `records`; rectangles in window coordinates.
+struct PatchRecord32 {
+  float kernel[4], ramp[4], domain[4], samples[4];
+  float slope[4];  // 1 / widths of the ramps at i0, j0, i1, j1
+  float quantum, origin, volume, rim;
+  float error[3], holes;  // slot of its holes; -1 none
+  float grid, solid, unused[2];
+  float turn[4];  // du/dx, du/dy, dv/dx, dv/dy
+};
+static_assert(sizeof(PatchRecord32) == 9 * 16);
+
+/// The same in double, for exact.comp.
+struct PatchRecord64 {
+  double x0, y0, ua, ub, va, vb, first_i, first_j;
+  double kernel[4], ramp[4], domain[4], samples[4];
+  double quantum, base, origin, volume, error[3], rim;
+};
+static_assert(sizeof(PatchRecord64) == 32 * 8);
+
+struct PatchPool::Impl {
+  std::shared_ptr<Device> device;
+  vk::Buffer samples, records, exact;
+  vk::OwnedView sample_texels, word_texels, record_texels;
+  vk::UploadRing ring;
+};
+
+}  // namespace patchwork

@@ -1,0 +1,24 @@
+#include "blend/vulkan/shaders.h"
+
+namespace patchwork::shaders {
+
+namespace {
+
+// Made by glslc in the build tree, numbers alone (blend/CMakeLists.txt).
+constexpr std::uint32_t kClassify[] = {
+#include "classify.spv.inc"
+};
+constexpr std::uint32_t kBlend[] = {
+#include "blend.spv.inc"
+};
+constexpr std::uint32_t kExact[] = {
+#include "exact.spv.inc"
+};
+
+}  // namespace
+
+std::span<const std::uint32_t> classify() { return kClassify; }
+std::span<const std::uint32_t> blend() { return kBlend; }
+std::span<const std::uint32_t> exact() { return kExact; }
+
+}  // namespace patchwork::shaders

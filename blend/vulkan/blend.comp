@@ -1,6 +1,6 @@
 #version 450
-// Blocks of 16 x 16 points of tiles, in float32: copied from one patch or composed of several. Points where
-// rounding could decide (at the rim of all data, in cells without data) are left for exact.comp.
+// Blocks of 8 x 8 points of tiles, in float32: copied from one patch or composed of several, by kMode. Points
+// where rounding could decide (at the rim of all data, in cells without data) are left for exact.comp.
 #define real float
 #define vec2_ vec2
 #define vec3_ vec3
@@ -12,11 +12,13 @@
 #include "holes.glsl"
 #include "sum.glsl"
 
-// Four rows an invocation: what is loaded of a patch is used four times.
-layout(local_size_x = 16, local_size_y = 4) in;
+// Four blocks, 8 x 2 invocations each; every invocation has four rows: what it loads of a patch is used four
+// times.
+layout(local_size_x = 64) in;
 
-// Below this sum of weights the ramps' own rounding would show.
-const float kUncertain = 1.0 / 1024;
+// Below this sum of weights the ramps' own rounding would show: at smoothness 0, 1, 2 a ramp has it 1/1024,
+// 1/1800 and 1/550 of its width from the rim.
+const float kUncertain = kSmoothness == 0 ? 1.0 / 1024 : kSmoothness == 1 ? 1.0 / 1048576 : 1.0 / 16777216;
 // So near to a domain (window cells) a point that is outside may be inside.
 const float kRoom = 1.0 / 65536;
 
@@ -37,20 +39,21 @@ Patch load_affine(uint entry) {
   p.whole_u = texelFetch(entries, e), p.rest_u = texelFetch(entries, e + 1);
   p.whole_v = texelFetch(entries, e + 2), p.rest_v = texelFetch(entries, e + 3);
   p.slot = int(p.whole_v.w);
-  const int r = p.slot * kRecord;
-  const vec4 numbers = texelFetch(records, r + 5), errors = texelFetch(records, r + 6);
-  p.quantum = numbers.x, p.origin = numbers.y, p.volume = numbers.z, p.rim = numbers.w;
-  p.error = errors[kSmoothness], p.holes = int(errors.w);
-  p.grid = int(texelFetch(records, r + 7).x);
-  const vec4 turn = kGradient ? texelFetch(records, r + 8) : vec4(0);
+  const vec4 numbers = texelFetch(entries, e + 4);
+  p.quantum = numbers.x, p.origin = numbers.y, p.error = numbers.z, p.grid = int(numbers.w);
+  const vec4 turn = kGradient ? texelFetch(records, p.slot * kRecord + 6) : vec4(0);
   p.turn = mat2(turn.x, turn.y, turn.z, turn.w);
   return p;
 }
 
 void load_rects(inout Patch p) {
   const int r = p.slot * kRecord;
-  p.ramp = rect_of(texelFetch(records, r + 1)), p.domain = rect_of(texelFetch(records, r + 2));
-  p.samples = rect_of(texelFetch(records, r + 3)), p.slope = texelFetch(records, r + 4);
+  p.domain = rect_of(texelFetch(records, r + 2));
+  if (kPriority) p.ramp = rect_of(texelFetch(records, r + 1)), p.slope = texelFetch(records, r + 4);
+  if (kPriority && kMode == kPlain) return;
+  const vec4 numbers = texelFetch(records, r + 5);
+  p.samples = rect_of(texelFetch(records, r + 3));
+  p.volume = numbers.x, p.rim = numbers.y, p.holes = int(numbers.z);
 }
 
 Place along(vec4 whole, vec4 rest, vec2 d) {
@@ -67,8 +70,7 @@ Jet height_of(Patch p, Place u, Place v) {
 
 struct Point { Sum sum; vec2 at; bool wanted, uncertain; };
 
-Point point_at(uint block_c, uint block_r, uint row, Tile tile) {
-  const uint c = block_c * kBlock + gl_LocalInvocationID.x, r = block_r * kBlock + row + gl_LocalInvocationID.y;
+Point point_at(uint c, uint r, Tile tile) {
   return Point(nothing(), vec2(c, r), c < tile.across && r < tile.down, false);
 }
 
@@ -77,23 +79,21 @@ void compose(inout Point q, Patch p) {
   const vec2 d = q.at - vec2(p.whole_u.w, p.rest_u.w);
   const Place u = along(p.whole_u, p.rest_u, d), v = along(p.whole_v, p.rest_v, d);
   const float depth = depth_in(p.domain, u, v);
-  if (depth < -kRoom) return;
-  q.uncertain = true;
+  q.uncertain = q.uncertain || depth >= -kRoom;
   if (depth < 0) return;
   Jet own = kPriority ? ramp_weight(p.ramp, p.slope, u, v) : wendland_weight(p.domain, u, v);
   bool real_cell = true;
-  if (p.holes >= 0) {
-    const uint bits = cell_bits(p.holes, u, v);
-    if ((bits & 1u) == 0) return;
-    real_cell = (bits & 2u) != 0;
-    own = times(own, hole_factor(p.holes, u, v));
+  float error = p.error;
+  if (kMode == kHoles) {
+    if (depth_in(p.samples, u, v) < -kOnEdge) error += p.rim;
+    if (p.holes >= 0) {
+      const uint bits = cell_bits(p.holes, u, v);
+      if ((bits & 1u) == 0) return;
+      real_cell = (bits & 2u) != 0;
+      own = times(own, hole_factor(p.holes, u, v));
+    }
   }
-  const float error = depth_in(p.samples, u, v) < -kOnEdge ? p.error + p.rim : p.error;
   add(q.sum, own, own, p.volume, height_of(p, u, v), error, real_cell ? p.grid : -p.grid, p.turn);
-}
-
-uint place_of(Point q, uint tile) {
-  return (tile * push.side + uint(q.at.y)) * push.side + uint(q.at.x);
 }
 
 bool on_exact_rim(Point q, Tile tile) {
@@ -101,54 +101,40 @@ bool on_exact_rim(Point q, Tile tile) {
                                  int(q.at.y) == tile.down - 1);
 }
 
-// Vertices that nobody asked for, in tiles at the end of a raster.
-void blank(Point q, uint t) {
-  if (q.at.x < push.side && q.at.y < push.side) put(place_of(q, t), Answer(0, 0, vec2(0), 0), false);
-}
-
 void postpone(uint at) {
   const uint n = atomicAdd(tally.later_count, 1);
   tally.later[n] = at;
-  if (n % 64 == 0) atomicAdd(tally.groups, 1);
+  if (n % 64 == 0) atomicAdd(tally.later_groups[0], 1);
 }
 
-// Counts the patches read where it answers.
-void copy(Point q, Patch p, uint t, Tile tile, inout uint reads) {
-  if (!q.wanted) {
-    blank(q, t);
-    return;
-  }
-  const uint at = place_of(q, t);
-  if (on_exact_rim(q, tile)) {
-    postpone(at);
-    return;
-  }
+// What a group counts: patches read, the most at a point, the largest bound.
+struct Counted { uint reads, most; float bound; };
+
+// Vertices of the tile that nobody asked for have no data.
+void write(Point q, uint t, Tile tile, Answer a, uint reads, bool uncertain, inout Counted n) {
+  if (q.at.x >= push.side || q.at.y >= push.side) return;
+  const uint at = (t * push.side + uint(q.at.y)) * push.side + uint(q.at.x);
+  const bool later = q.wanted && (uncertain || on_exact_rim(q, tile)), any = q.wanted && !later && reads > 0;
+  put(at, a, any);
+  if (later) postpone(at);
+  if (!any) return;
+  n.reads += reads, n.most = max(n.most, reads);
+  if (a.bound <= push.strict_error) n.bound = max(n.bound, a.bound);
+}
+
+void copy(Point q, Patch p, uint t, Tile tile, inout Counted n) {
   const vec2 d = q.at - vec2(p.whole_u.w, p.rest_u.w);
   const Jet h = height_of(p, along(p.whole_u, p.rest_u, d), along(p.whole_v, p.rest_v, d));
-  put(at, Answer(h.at, p.error, p.turn * vec2(h.u, h.v), p.grid), true);
-  ++reads;
+  write(q, t, tile, Answer(h.at, p.error, p.turn * vec2(h.u, h.v), p.grid), 1, false, n);
 }
 
-// Returns what the tally counts: patches read, and the bound.
-void write(Point q, uint t, Tile tile, inout uint reads, inout uint most, inout float bound) {
-  if (!q.wanted) {
-    blank(q, t);
-    return;
-  }
-  const uint at = place_of(q, t);
-  if ((q.uncertain && !(q.sum.plain >= kUncertain)) || on_exact_rim(q, tile)) {
-    postpone(at);
-    return;
-  }
-  Answer a = Answer(0, 0, vec2(0), 0);
-  if (q.sum.reads > 0) a = finish(q.sum);
-  put(at, a, q.sum.reads > 0);
-  reads += q.sum.reads, most = max(most, q.sum.reads);
-  if (q.sum.reads > 0 && a.bound <= push.strict_error) bound = max(bound, a.bound);
+void write_sum(Point q, uint t, Tile tile, inout Counted n) {
+  write(q, t, tile, finish(q.sum), q.sum.reads, q.uncertain && !(q.sum.plain >= kUncertain), n);
 }
 
-void count(uint reads, uint most, float bound) {
-  const uint all = subgroupAdd(reads), largest = subgroupMax(most), worst = subgroupMax(floatBitsToUint(bound));
+void count(Counted n) {
+  const uint all = subgroupAdd(n.reads), largest = subgroupMax(n.most);
+  const uint worst = subgroupMax(floatBitsToUint(n.bound));
   if (!subgroupElect()) return;
   atomicAdd(tally.contributions, all);
   atomicMax(tally.most, largest);
@@ -156,28 +142,30 @@ void count(uint reads, uint most, float bound) {
 }
 
 void main() {
-  const uint t = gl_WorkGroupID.z, bc = gl_WorkGroupID.x, br = gl_WorkGroupID.y;
+  const uint item = gl_WorkGroupID.x * 4 + gl_LocalInvocationID.x / 16, blocks = push.blocks * push.blocks;
+  if (item >= modes.counts[kMode]) return;
+  const uint number = work[kMode * tiles.length() * blocks + item], t = number / blocks, block = number % blocks;
   const Tile tile = tiles[t];
-  const uint from = tile.lists + (br * push.blocks + bc) * (tile.count + 1);
-  const uint length = texelFetch(lists, int(from)).x;
-  Point a = point_at(bc, br, 0, tile), b = point_at(bc, br, 4, tile);
-  Point c = point_at(bc, br, 8, tile), d = point_at(bc, br, 12, tile);
-  uint reads = 0, most = 0;
-  float bound = 0;
-  if ((length & kCopied) != 0) {
+  const uint from = tile.lists + block * (tile.count + 1);
+  const uint column = block % push.blocks * kBlock + gl_LocalInvocationID.x % 8;
+  const uint row = block / push.blocks * kBlock + gl_LocalInvocationID.x / 8 % 2;
+  Point a = point_at(column, row, tile), b = point_at(column, row + 2, tile);
+  Point c = point_at(column, row + 4, tile), d = point_at(column, row + 6, tile);
+  Counted n = Counted(0, 0, 0);
+  if (kMode == kCopy) {
     const Patch p = load_affine(tile.first + texelFetch(lists, int(from + 1)).x);
-    copy(a, p, t, tile, reads), copy(b, p, t, tile, reads);
-    copy(c, p, t, tile, reads), copy(d, p, t, tile, reads);
-    most = min(reads, 1);
-    bound = reads > 0 && p.error <= push.strict_error ? p.error : 0;
+    copy(a, p, t, tile, n), copy(b, p, t, tile, n), copy(c, p, t, tile, n), copy(d, p, t, tile, n);
   } else {
-    for (uint k = 0; k < length; ++k) {
-      Patch p = load_affine(tile.first + texelFetch(lists, int(from + 1 + k)).x);
+    const uint length = texelFetch(lists, int(from)).x;
+    if (length == 0) a.wanted = b.wanted = c.wanted = d.wanted = false;
+    // The condition comes last: lavapipe leaves a loop at its end alone.
+    uint k = 0;
+    do {
+      Patch p = load_affine(length == 0 ? 0 : tile.first + texelFetch(lists, int(from + 1 + k)).x);
       load_rects(p);
       compose(a, p), compose(b, p), compose(c, p), compose(d, p);
-    }
-    write(a, t, tile, reads, most, bound), write(b, t, tile, reads, most, bound);
-    write(c, t, tile, reads, most, bound), write(d, t, tile, reads, most, bound);
+    } while (++k < length);
+    write_sum(a, t, tile, n), write_sum(b, t, tile, n), write_sum(c, t, tile, n), write_sum(d, t, tile, n);
   }
-  count(reads, most, bound);
+  count(n);
 }

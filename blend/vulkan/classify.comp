@@ -1,6 +1,6 @@
 #version 450
-// For each block of 16 x 16 points: which of its tile's patches reach it. With priority the list ends with the
-// first patch that holds the block in its kernel; if that is the only one, the block is copied.
+// For each block of 8 x 8 points: which of its tile's patches reach it, and what is to be done with it. With
+// priority the list ends with the first patch that holds the block in its kernel.
 #define real float
 #define vec2_ vec2
 #define vec3_ vec3
@@ -22,21 +22,26 @@ vec2 range_of(vec3 whole, vec3 rest, vec4 corners) {
   return vec2(min(min(at.x, at.y), min(at.z, at.w)), max(max(at.x, at.y), max(at.z, at.w)));
 }
 
+// Blocks of a work group of blend.comp.
+const uint kBlocksAGroup = 4;
+
+void list_work(int mode, uint number) {
+  const uint n = atomicAdd(modes.counts[mode], 1);
+  work[mode * tiles.length() * push.blocks * push.blocks + n] = number;
+  if (n % kBlocksAGroup == 0) atomicAdd(modes.groups[3 * mode], 1);
+}
+
 void main() {
-  const uint blocks = push.blocks * push.blocks, block = gl_GlobalInvocationID.x % blocks;
-  const uint t = gl_GlobalInvocationID.x / blocks;
+  const uint blocks = push.blocks * push.blocks, number = gl_GlobalInvocationID.x, block = number % blocks;
+  const uint t = number / blocks;
   if (t >= tiles.length()) return;
   const Tile tile = tiles[t];
   const int c0 = int(block % push.blocks) * kBlock, r0 = int(block / push.blocks) * kBlock;
   const int c1 = min(c0 + kBlock, tile.across) - 1, r1 = min(r0 + kBlock, tile.down) - 1;
-  const uint to = tile.lists + block * (tile.count + 1);
-  if (c1 < c0 || r1 < r0) {
-    written[to] = 0;
-    return;
-  }
-  uint kept = 0, outs = 0;
-  bool copied = false;
-  for (uint k = 0; k < tile.count; ++k) {
+  const uint to = tile.lists + block * (tile.count + 1), wanted = c1 < c0 || r1 < r0 ? 0 : tile.count;
+  uint kept = 0;
+  bool copied = false, plain = true;
+  for (uint k = 0; k < wanted; ++k) {
     const int e = int(tile.first + k) * kEntry;
     const vec4 a = texelFetch(entries, e), b = texelFetch(entries, e + 1);
     const vec4 c = texelFetch(entries, e + 2), d = texelFetch(entries, e + 3);
@@ -45,22 +50,21 @@ void main() {
     const int record = int(c.w) * kRecord;
     const vec4 domain = texelFetch(records, record + 2), kernel = texelFetch(records, record);
     if (push.classify != 0 && (u.y < domain.x - kRoom || u.x > domain.z + kRoom || v.y < domain.y - kRoom ||
-                               v.x > domain.w + kRoom)) {
-      ++outs;
+                               v.x > domain.w + kRoom))
       continue;
-    }
     written[to + 1 + kept++] = k;
-    const bool solid = texelFetch(records, record + 7).y != 0;
+    const uint kind = uint(texelFetch(records, record + 5).w);
+    plain = plain && (kind & 2u) != 0;
     const bool holds = u.x > kernel.x + kRoom && u.y < kernel.z - kRoom && v.x > kernel.y + kRoom &&
                        v.y < kernel.w - kRoom;
-    if (push.classify != 0 && kPriority && solid && holds) {
+    if (push.classify != 0 && kPriority && (kind & 1u) != 0 && holds) {
       copied = kept == 1;
-      outs += tile.count - k - 1;
       break;
     }
   }
-  written[to] = kept | (copied ? kCopied : 0u);
-  atomicAdd(tally.outs, outs);
+  written[to] = kept;
+  list_work(copied ? kCopy : plain ? kPlain : kHoles, number);
+  atomicAdd(tally.outs, wanted - kept);
   atomicAdd(tally.insides, copied ? 1 : 0);
   atomicAdd(tally.partials, copied ? 0 : kept);
 }

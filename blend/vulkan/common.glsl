@@ -4,13 +4,16 @@
 
 const int kSide = 41;                      // vertices of a window along each side: PatchSurface::kSide
 const int kSamples = kSide * kSide;
-const int kBlock = 16;                     // points of a block along each side
+const int kBlock = 8;                      // points of a block along each side
 const real kOnEdge = real(1.0) / 1048576;  // of a cell: nearer to an edge than this a point lies on it
 const real kHoleFeather = real(8);         // the distance of full weight: kFeatherCells
 
 layout(constant_id = 0) const int kSmoothness = 0;
 layout(constant_id = 1) const bool kPriority = true;
 layout(constant_id = 2) const bool kGradient = false;
+layout(constant_id = 3) const bool kBound = true;   // planes of the results
+layout(constant_id = 4) const bool kSource = true;
+layout(constant_id = 5) const int kMode = 0;        // of blend.comp
 
 layout(binding = 0) uniform samplerBuffer samples;   // codes; kSamples a slot
 layout(binding = 1) uniform usamplerBuffer words;    // the same slots where they hold a patch's holes
@@ -21,8 +24,13 @@ layout(binding = 6) uniform usamplerBuffer lists;    // of a block: its length, 
 layout(binding = 7) writeonly buffer Results { uint results[]; };
 layout(binding = 9) readonly buffer Points { double points[]; };  // x, y; metres
 
-const int kRecord = 9, kExactRecord = 32, kEntry = 4;
-const uint kCopied = 0x80000000u;  // of a list's length: one patch holds the block in its kernel
+const int kRecord = 7, kExactRecord = 32, kEntry = 5;
+// What is done with a block; each mode has a work list and a pipeline of its own, because lavapipe runs both sides
+// of every branch.
+const int kCopy = 0;   // one patch holds it in its kernel
+const int kPlain = 1;  // patches without holes, samples up to their rims
+const int kHoles = 2;  // any patches
+const int kLater = 3;  // single points, in double
 
 struct Tile {
   uint first, count;   // entries
@@ -32,13 +40,22 @@ struct Tile {
 };
 layout(binding = 5) readonly buffer Tiles { Tile tiles[]; };
 
+// What classify.comp found: of the first three modes, the groups of an indirect dispatch (x y z) and the items of
+// the work list. Apart from the tally, which dispatches that run side by side write.
+layout(binding = 12) buffer Modes {
+  uint groups[9];
+  uint counts[3];
+} modes;
+
 layout(binding = 8) buffer Tally {
-  uint groups, one_y, one_z;  // of the indirect dispatch over `later`
-  uint later_count;
+  uint later_groups[3], later_count;    // of kLater
   uint contributions, most, bound_max;  // bound_max: bits of a float, which order as their values
   uint outs, insides, partials;         // of (block, patch) pairs
-  uint later[];                         // points that need exact positions
+  uint later[];                         // work list of kLater: places in the results
 } tally;
+
+// Block b of tile t is number t blocks^2 + b; a list for each of the first three modes, room for all in each.
+layout(binding = 11) buffer WorkLists { uint work[]; };
 
 layout(push_constant) uniform Push {
   double x0, xc, xr, y0, yc, yr;  // the lattice

@@ -1,12 +1,18 @@
 // What the parts of the Vulkan layer know of the device.
 #pragma once
 
+#include <map>
 #include <mutex>
+#include <utility>
 
 #include "blend/vulkan/device.h"
 #include "blend/vulkan/handle_impl.h"
 
 namespace patchwork {
+
+namespace vk {
+class Passes;
+}
 
 struct Device::Impl {
   // Messages come from any thread that calls Vulkan; declared first, because the messenger writes here last.
@@ -22,6 +28,8 @@ struct Device::Impl {
   vk::LogicalDevice device;
   VkQueue queue = VK_NULL_HANDLE;
   std::string name;
+  /// Compiled once: by smoothness and, true, priority.
+  std::map<std::pair<int, bool>, std::shared_ptr<vk::Passes>> passes;
 
   /// Throws Error with the name of what went wrong; `what` is the step that failed.
   void check(VkResult result, const char* what) const;

@@ -26,8 +26,9 @@ bool outside(vec4_ r, double u, double v, double room) {
   return u < r.x - room || u > r.z + room || v < r.y - room || v > r.w + room;
 }
 
-void compose(inout Sum s, int slot, dvec2 at) {
+void compose(inout Sum s, uint entry, dvec2 at) {
   if (kPriority && s.rest == 0) return;
+  const int e = int(entry) * kEntry, slot = int(texelFetch(entries, e + 2).w);
   const int x = slot * kExactRecord;
   precise const double dx = at.x - exact[x], dy = at.y - exact[x + 1];
   precise const double wu = (exact[x + 2] * dx + exact[x + 3] * dy) - exact[x + 6];
@@ -39,7 +40,7 @@ void compose(inout Sum s, int slot, dvec2 at) {
                       : wendland_weight(rect_of(domain), u, v);
   double floor_ = own.at;
   if (kPriority && ramp != domain) floor_ = ramp_weight(rect_of(domain), slope_of(kernel, domain), u, v).at;
-  const int record = slot * kRecord, holes = int(texelFetch(records, record + 6).w);
+  const int holes = int(texelFetch(records, slot * kRecord + 5).z);
   bool real_cell = true;
   if (holes >= 0) {
     const uint bits = cell_bits(holes, u, v);
@@ -54,16 +55,22 @@ void compose(inout Sum s, int slot, dvec2 at) {
   const double quantum = exact[x + 24];
   precise const double h = quantum * (exact[x + 26] + code.at) + exact[x + 25];
   const double error = exact[x + 28 + kSmoothness];
-  const int grid = int(texelFetch(records, record + 7).x);
+  const int grid = int(texelFetch(entries, e + 4).w);
   add(s, own, faded, exact[x + 27], Jet(h, quantum * code.u, quantum * code.v),
       outside(four(x + 20), wu, wv, kOnEdge) ? error + exact[x + 31] : error, real_cell ? grid : -grid,
       dmat2(exact[x + 2], exact[x + 3], exact[x + 4], exact[x + 5]));
 }
 
-Sum at_point(Tile tile, dvec2 at) {
+Sum of_tile(Tile tile, dvec2 at) {
   Sum s = nothing();
-  for (uint k = 0; k < tile.count; ++k)
-    compose(s, int(texelFetch(entries, int(tile.first + k) * kEntry + 2).w), at);
+  for (uint k = 0; k < tile.count; ++k) compose(s, tile.first + k, at);
+  return s;
+}
+
+Sum of_block(Tile tile, uint block, dvec2 at) {
+  Sum s = nothing();
+  const uint from = tile.lists + block * (tile.count + 1), length = texelFetch(lists, int(from)).x;
+  for (uint k = 0; k < length; ++k) compose(s, tile.first + texelFetch(lists, int(from + 1 + k)).x, at);
   return s;
 }
 
@@ -82,7 +89,7 @@ void put_double(uint at, double value) {
 void explicit_point(uint at) {
   const Tile tile = tiles[gl_WorkGroupID.x];
   if (gl_LocalInvocationID.x >= tile.across) return;
-  const Sum s = at_point(tile, dvec2(points[2 * at], points[2 * at + 1]));
+  const Sum s = of_tile(tile, dvec2(points[2 * at], points[2 * at + 1]));
   Answer a = Answer(0, 0, dvec2(0), 0);
   if (s.reads > 0) a = finish(s);
   const bool any = s.reads > 0 && float(a.bound) <= push.strict_error;
@@ -98,7 +105,7 @@ void tile_point(uint at) {
   const Tile tile = tiles[t];
   const double x = double(tile.c0 + tile.stride * int(c)), y = double(tile.r0 + tile.stride * int(r));
   precise const double px = push.x0 + (push.xc * x + push.xr * y), py = push.y0 + (push.yc * x + push.yr * y);
-  const Sum s = at_point(tile, dvec2(px, py));
+  const Sum s = of_block(tile, r / kBlock * push.blocks + c / kBlock, dvec2(px, py));
   Answer a = Answer(0, 0, dvec2(0), 0);
   if (s.reads > 0) a = finish(s);
   count(s, a.bound);

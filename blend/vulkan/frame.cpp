@@ -10,9 +10,9 @@ namespace {
 
 constexpr VkDescriptorType kTexels = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
 constexpr VkDescriptorType kStorage = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-// In the order of common.glsl; the last is classify.comp's.
-constexpr VkDescriptorType kTypes[] = {kTexels, kTexels,  kTexels,  kStorage, kTexels, kStorage,
-                                       kTexels, kStorage, kStorage, kStorage, kStorage};
+// In the order of common.glsl; binding 10 is classify.comp's.
+constexpr VkDescriptorType kTypes[] = {kTexels,  kTexels,  kTexels,  kStorage, kTexels,  kStorage, kTexels,
+                                       kStorage, kStorage, kStorage, kStorage, kStorage, kStorage};
 constexpr std::uint32_t kMarks = 6;
 
 // Room to grow: the next submission is often a little larger.
@@ -26,12 +26,20 @@ bool make_larger(const Device::Impl& device, Buffer& buffer, std::size_t bytes, 
 
 }  // namespace
 
-Passes::Passes(const Device::Impl& device, int smoothness, bool priority, bool gradient)
-    : bindings(device, kTypes, sizeof(Push), 2) {
-  const std::uint32_t constants[] = {std::uint32_t(smoothness), priority, gradient};
-  classify = make_pipeline(bindings, shaders::classify(), constants);
-  blend = make_pipeline(bindings, shaders::blend(), constants);
-  exact = make_pipeline(bindings, shaders::exact(), constants);
+Passes::Passes(const Device::Impl& device, int smoothness, bool priority)
+    : bindings(device, kTypes, sizeof(Push)), smoothness_(smoothness), priority_(priority) {}
+
+VkPipeline Passes::made(OwnedPipeline& pipeline, Planes planes, int mode) {
+  const std::uint32_t constants[] = {
+      std::uint32_t(smoothness_), priority_, planes.gradient, planes.bound, planes.source,
+      std::uint32_t(mode)};
+  if (!pipeline)
+    pipeline = make_pipeline(bindings,
+                             &pipeline == &classify_ ? shaders::classify()
+                             : mode == later         ? shaders::exact()
+                                                     : shaders::blend(),
+                             constants);
+  return pipeline.get();
 }
 
 Frame::Frame(const Device::Impl& device, Passes& passes, const PatchPool::Impl& pool)
@@ -40,7 +48,7 @@ Frame::Frame(const Device::Impl& device, Passes& passes, const PatchPool::Impl& 
       pool_(pool),
       commands_(device),
       timer_(device, kMarks),
-      set_(passes.bindings.make_set()) {}
+      sets_(passes.bindings.make_set(set_)) {}
 
 void Frame::grow(const Work& work) {
   const TileBins& bins = *work.bins;
@@ -55,6 +63,10 @@ void Frame::grow(const Work& work) {
   changed |= make_larger(device_, tiles_, tiles, storage, Where::card);
   changed |= make_larger(device_, points_, points, storage, Where::card);
   changed |= make_larger(device_, tally_, tally, storage | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT, Where::card);
+  changed |= make_larger(device_, modes_, sizeof(ModesHead), storage | VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT,
+                         Where::card);
+  changed |= make_larger(device_, work_, bins.tiles.size() * work.push.blocks * work.push.blocks * 12,
+                         storage, Where::card);
   changed |= make_larger(device_, results_, results, storage, Where::card);
   if (entries_.bytes() < entries || !entries_.get()) entry_texels_ = OwnedView();
   if (make_larger(device_, entries_, entries, texel, Where::card))
@@ -71,6 +83,7 @@ void Frame::bind_all() {
   b.bind(set_, 2, pool_.record_texels), b.bind(set_, 3, pool_.exact);
   b.bind(set_, 4, entry_texels_), b.bind(set_, 5, tiles_), b.bind(set_, 6, list_texels_);
   b.bind(set_, 7, results_), b.bind(set_, 8, tally_), b.bind(set_, 9, points_), b.bind(set_, 10, lists_);
+  b.bind(set_, 11, work_), b.bind(set_, 12, modes_);
 }
 
 void Frame::stage(const Work& work, VkCommandBuffer commands) {
@@ -85,31 +98,45 @@ void Frame::stage(const Work& work, VkCommandBuffer commands) {
   send(entries_, std::span(work.bins->entries)), send(tiles_, std::span(work.bins->tiles));
   send(points_, work.points);
   TallyHead head{};
-  head.one_y = head.one_z = 1;
+  head.later_groups[1] = head.later_groups[2] = 1;
   vkCmdUpdateBuffer(commands, tally_.get(), 0, sizeof head, &head);
+  ModesHead modes{};
+  for (auto& groups : modes.groups) groups[1] = groups[2] = 1;
+  vkCmdUpdateBuffer(commands, modes_.get(), 0, sizeof modes, &modes);
 }
 
+// Modes that no block can have are left out, so that their pipelines are not even made.
 void Frame::record(const Work& work, VkCommandBuffer commands) {
-  const auto start = [&](const OwnedPipeline& pipeline) {
-    timer_.mark(commands);
-    barrier(commands);
-    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.get());
+  const auto use = [&](VkPipeline pipeline) {
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
   };
+  const auto run = [&](Passes::Mode mode) {
+    use(passes_.evaluate(mode, work.planes));
+    const bool later = mode == Passes::later;
+    vkCmdDispatchIndirect(commands, (later ? tally_ : modes_).get(),
+                          later ? 0 : mode * sizeof(std::uint32_t[3]));
+  };
+  const auto next = [&] { timer_.mark(commands), barrier(commands); };
   const std::uint32_t tiles = std::uint32_t(work.bins->tiles.size()), blocks = work.push.blocks;
   const VkPipelineLayout layout = passes_.bindings.layout();
   vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout, 0, 1, &set_, 0, nullptr);
   vkCmdPushConstants(commands, layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(Push), &work.push);
-  start(passes_.classify);
-  if (!work.push.explicit_points) vkCmdDispatch(commands, (tiles * blocks * blocks + 63) / 64, 1, 1);
-  start(passes_.blend);
-  if (!work.push.explicit_points) vkCmdDispatch(commands, blocks, blocks, tiles);
-  start(passes_.exact);
-  if (work.push.explicit_points)
+  next();
+  if (work.push.explicit_points) {
+    next(), next();
+    use(passes_.evaluate(Passes::later, work.planes));
     vkCmdDispatch(commands, tiles, 1, 1);
-  else
-    vkCmdDispatchIndirect(commands, tally_.get(), 0);
-  timer_.mark(commands);
-  barrier(commands);
+    return next();
+  }
+  use(passes_.classify());
+  vkCmdDispatch(commands, (tiles * blocks * blocks + 63) / 64, 1, 1);
+  next();
+  if (work.push.classify && passes_.priority()) run(Passes::copy);
+  run(Passes::plain);
+  if (work.ragged) run(Passes::holes);
+  next();
+  run(Passes::later);
+  next();
 }
 
 void Frame::submit(const Work& work) {

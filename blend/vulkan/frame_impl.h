@@ -22,14 +22,40 @@ static_assert(sizeof(Push) == 96);
 
 /// common.glsl: Tally without the list behind it.
 struct TallyHead {
-  std::uint32_t groups, one_y, one_z, later_count, contributions, most, bound_max, outs, insides, partials;
+  std::uint32_t later_groups[3], later_count, contributions, most, bound_max, outs, insides, partials;
 };
 
-/// The evaluator's three passes for one smoothness and composition.
-struct Passes {
-  Passes(const Device::Impl& device, int smoothness, bool priority, bool gradient);
+/// common.glsl: Modes.
+struct ModesHead {
+  std::uint32_t groups[3][3], counts[3];
+};
+
+/// Planes of the results besides the height.
+struct Planes {
+  bool bound = true, source = true, gradient = false;
+  std::size_t words() const { return 1u + bound + source + 2u * gradient; }
+  int number() const { return bound | source << 1 | gradient << 2; }
+};
+
+/// The evaluator's passes for one smoothness and composition, shared by all evaluators of a device.
+class Passes {
+ public:
+  enum Mode { copy, plain, holes, later };  ///< common.glsl: kCopy and so on
+  Passes(const Device::Impl& device, int smoothness, bool priority);
+
   Bindings bindings;
-  OwnedPipeline classify, blend, exact;
+  bool priority() const { return priority_; }
+  VkPipeline classify() { return made(classify_, {}, 0); }
+  /// Compiled when first asked for: it takes some 50 ms on lavapipe.
+  VkPipeline evaluate(Mode mode, Planes planes) {
+    return made(evaluate_[mode][planes.number()], planes, mode);
+  }
+
+ private:
+  VkPipeline made(OwnedPipeline& pipeline, Planes planes, int mode);
+  int smoothness_;
+  bool priority_;
+  OwnedPipeline classify_, evaluate_[4][8];
 };
 
 /// What a submission is made of.
@@ -37,6 +63,8 @@ struct Work {
   const TileBins* bins = nullptr;
   std::span<const double> points = {};  ///< x, y of explicit points, 64 a tile
   Push push{};
+  Planes planes{};
+  bool ragged = true;  ///< some patch is not PatchKind::kPlain
   std::size_t result_words = 0;
 };
 
@@ -64,8 +92,9 @@ class Frame {
   const PatchPool::Impl& pool_;
   Commands commands_;
   Timer timer_;
-  VkDescriptorSet set_;
-  Buffer staging_, entries_, tiles_, lists_, tally_, results_, points_, readback_;
+  VkDescriptorSet set_ = VK_NULL_HANDLE;
+  OwnedSets sets_;
+  Buffer staging_, entries_, tiles_, lists_, tally_, results_, points_, work_, modes_, readback_;
   OwnedView entry_texels_, list_texels_;
   std::size_t result_words_ = 0;
 };

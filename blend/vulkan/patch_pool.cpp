@@ -4,7 +4,6 @@
 #include <cmath>
 #include <unordered_set>
 
-#include "blend/placed.h"
 #include "blend/vulkan/patch_pool_impl.h"
 #include "db/error.h"
 
@@ -20,17 +19,13 @@ void put(T (&to)[4], const LatticeRect& r) {
   to[0] = T(r.i0), to[1] = T(r.j0), to[2] = T(r.i1), to[3] = T(r.j1);
 }
 
-PatchRecord32 record32(const Blend::Placed& p, const PatchRecord& facts, const PatchPool::Resident& r,
-                       float origin) {
+PatchRecord32 record32(const Blend::Placed& p, const PatchPool::Resident& r) {
   PatchRecord32 out{};
   put(out.kernel, p.kernel), put(out.ramp, p.ramp), put(out.domain, p.domain), put(out.samples, p.samples);
   out.slope[0] = float(1 / (p.kernel.i0 - p.ramp.i0)), out.slope[1] = float(1 / (p.kernel.j0 - p.ramp.j0));
   out.slope[2] = float(1 / (p.ramp.i1 - p.kernel.i1)), out.slope[3] = float(1 / (p.ramp.j1 - p.kernel.j1));
-  out.quantum = float(p.quantum), out.origin = origin, out.volume = float(p.volume), out.rim = float(p.rim);
-  std::copy(facts.error.begin(), facts.error.end(), out.error);
-  out.holes = r.holes ? float(*r.holes) : -1;
-  // 0 means that nothing answers, and the sign that a cell was filled.
-  out.grid = float(p.id.grid().value + 1), out.solid = !p.ragged && p.kernel_is_sampled();
+  out.volume = float(p.volume), out.rim = float(p.rim), out.holes = r.holes ? float(*r.holes) : -1;
+  out.kind = float((!p.ragged && p.kernel_is_sampled() ? kSolid : 0) | (is_plain(p) ? kPlain : 0));
   out.turn[0] = float(p.ua), out.turn[1] = float(p.ub), out.turn[2] = float(p.va), out.turn[3] = float(p.vb);
   return out;
 }
@@ -71,6 +66,11 @@ std::unique_ptr<PatchPool::Impl> make_impl(std::shared_ptr<Device> device, std::
 }
 
 }  // namespace
+
+bool is_plain(const Blend::Placed& p) {
+  return !p.ragged && p.samples.i0 <= p.domain.i0 && p.samples.j0 <= p.domain.j0 &&
+         p.samples.i1 >= p.domain.i1 && p.samples.j1 >= p.domain.j1;
+}
 
 PatchPool::PatchPool(std::shared_ptr<Device> device, const Database& db, std::size_t slots)
     : db_(db), slots_(std::max<std::size_t>(slots, 2)) {
@@ -125,7 +125,9 @@ void PatchPool::add(PatchId id) {
   const Blend::Placed placed = place(db_, id, 0);
   const PatchRecord facts = db_.patch(id);
   const float origin = surface->codes[kSamples / 2];
-  Resident r{.slot = take_slot(), .height = placed.quantum * (placed.origin + double(origin)) + placed.base};
+  Resident r{.slot = take_slot(),
+             .origin = origin,
+             .height = placed.quantum * (placed.origin + double(origin)) + placed.base};
   const auto send = [&](const vk::Buffer& to, std::uint32_t slot, const auto& items) {
     const auto bytes = std::as_bytes(std::span(items));
     impl_->ring.write(to, VkDeviceSize{slot} * bytes.size(), bytes);
@@ -135,7 +137,7 @@ void PatchPool::add(PatchId id) {
     r.holes = take_slot();
     send(impl_->samples, *r.holes, words_of(*surface->holes));
   }
-  const PatchRecord32 record[] = {record32(placed, facts, r, origin)};
+  const PatchRecord32 record[] = {record32(placed, r)};
   const PatchRecord64 exact[] = {record64(placed, facts)};
   send(impl_->records, r.slot, record);
   send(impl_->exact, r.slot, exact);

@@ -19,12 +19,13 @@ namespace patchwork {
 class PatchPool {
  public:
   /// What a slot takes on the card: samples and the two records.
-  static constexpr std::size_t kSlotBytes = PatchSurface::kSide * PatchSurface::kSide * 4 + 9 * 16 + 32 * 8;
+  static constexpr std::size_t kSlotBytes = PatchSurface::kSide * PatchSurface::kSide * 4 + 7 * 16 + 32 * 8;
 
   struct Resident {
     std::uint32_t slot = 0;
     std::optional<std::uint32_t> holes = {};  ///< slot
-    double height = 0;                        ///< metres: of the code that the shader's codes are relative to
+    float origin = 0;                         ///< a code of its middle: the shader's codes are relative to it
+    double height = 0;                        ///< of that code, metres
   };
   /// Since the pool was made.
   struct Traffic {

@@ -1,6 +1,7 @@
 // The pool's buffers, as shaders see them.
 #pragma once
 
+#include "blend/placed.h"
 #include "blend/vulkan/buffer_impl.h"
 #include "blend/vulkan/patch_pool.h"
 
@@ -9,13 +10,17 @@ namespace patchwork {
 /// A slot's numbers in float32, texels of common.glsl's `records`; rectangles in window coordinates.
 struct PatchRecord32 {
   float kernel[4], ramp[4], domain[4], samples[4];
-  float slope[4];  // 1 / widths of the ramps at i0, j0, i1, j1
-  float quantum, origin, volume, rim;
-  float error[3], holes;  // slot of its holes; -1 none
-  float grid, solid, unused[2];
-  float turn[4];  // du/dx, du/dy, dv/dx, dv/dy
+  float slope[4];            // 1 / widths of the ramps at i0, j0, i1, j1
+  float volume, rim, holes;  // slot of its holes; -1 none
+  float kind;                // PatchKind
+  float turn[4];             // du/dx, du/dy, dv/dx, dv/dy
 };
-static_assert(sizeof(PatchRecord32) == 9 * 16);
+static_assert(sizeof(PatchRecord32) == 7 * 16);
+
+enum PatchKind {
+  kSolid = 1,  ///< in its kernel it answers alone: no holes, and its samples reach beyond it
+  kPlain = 2   ///< no holes, and samples everywhere
+};
 
 /// The same in double, for exact.comp.
 struct PatchRecord64 {
@@ -24,6 +29,9 @@ struct PatchRecord64 {
   double quantum, base, origin, volume, error[3], rim;
 };
 static_assert(sizeof(PatchRecord64) == 32 * 8);
+
+/// What PatchKind::kPlain says.
+bool is_plain(const Blend::Placed& p);
 
 struct PatchPool::Impl {
   std::shared_ptr<Device> device;

@@ -29,11 +29,11 @@ OwnedLayout make_layout(const Device::Impl& device, VkDescriptorSetLayout set, s
   return OwnedLayout(device.get(), layout);
 }
 
-OwnedSets make_sets(const Device::Impl& device, std::uint32_t sets, std::uint32_t bindings) {
-  const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets * bindings},
-                                        {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * bindings}};
+OwnedSets make_pool(const Device::Impl& device, std::uint32_t bindings) {
+  const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, bindings},
+                                        {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, bindings}};
   VkDescriptorPoolCreateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, info.maxSets = sets;
+  info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, info.maxSets = 1;
   info.poolSizeCount = 2, info.pPoolSizes = sizes;
   VkDescriptorPool pool = VK_NULL_HANDLE;
   device.check(vkCreateDescriptorPool(device.get(), &info, nullptr, &pool), "making a descriptor pool");
@@ -52,21 +52,20 @@ OwnedShader make_shader(const Device::Impl& device, std::span<const std::uint32_
 }  // namespace
 
 Bindings::Bindings(const Device::Impl& device, std::span<const VkDescriptorType> types,
-                   std::uint32_t push_bytes, std::uint32_t sets)
+                   std::uint32_t push_bytes)
     : device_(device),
       types_(types.begin(), types.end()),
       set_layout_(make_set_layout(device, types)),
-      layout_(make_layout(device, set_layout_.get(), push_bytes)),
-      sets_(make_sets(device, sets, std::uint32_t(types.size()))) {}
+      layout_(make_layout(device, set_layout_.get(), push_bytes)) {}
 
-VkDescriptorSet Bindings::make_set() {
+OwnedSets Bindings::make_set(VkDescriptorSet& set) const {
+  OwnedSets pool = make_pool(device_, std::uint32_t(types_.size()));
   const VkDescriptorSetLayout layout = set_layout_.get();
   VkDescriptorSetAllocateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-  info.descriptorPool = sets_.get(), info.descriptorSetCount = 1, info.pSetLayouts = &layout;
-  VkDescriptorSet set = VK_NULL_HANDLE;
+  info.descriptorPool = pool.get(), info.descriptorSetCount = 1, info.pSetLayouts = &layout;
   device_.check(vkAllocateDescriptorSets(device_.get(), &info, &set), "making a descriptor set");
-  return set;
+  return pool;
 }
 
 void Bindings::bind(VkDescriptorSet set, std::uint32_t binding, const Buffer& buffer) const {

@@ -13,9 +13,9 @@ namespace patchwork::vk {
 class Bindings {
  public:
   /// One element a binding: VK_DESCRIPTOR_TYPE_STORAGE_BUFFER or ..._UNIFORM_TEXEL_BUFFER.
-  Bindings(const Device::Impl& device, std::span<const VkDescriptorType> types, std::uint32_t push_bytes,
-           std::uint32_t sets);
-  VkDescriptorSet make_set();
+  Bindings(const Device::Impl& device, std::span<const VkDescriptorType> types, std::uint32_t push_bytes);
+  /// A pool of one descriptor set.
+  OwnedSets make_set(VkDescriptorSet& set) const;
   /// REQUIRES: nothing that was submitted with the set still runs.
   void bind(VkDescriptorSet set, std::uint32_t binding, const Buffer& buffer) const;
   void bind(VkDescriptorSet set, std::uint32_t binding, const OwnedView& view) const;
@@ -27,7 +27,6 @@ class Bindings {
   std::vector<VkDescriptorType> types_;
   OwnedSetLayout set_layout_;
   OwnedLayout layout_;
-  OwnedSets sets_;
 };
 
 /// `constants`: specialization constants 0, 1, ...

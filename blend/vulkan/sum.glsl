@@ -49,8 +49,8 @@ const uint kNan = 0x7fc00000u;
 void put(uint at, Answer a, bool any) {
   any = any && float(a.bound) <= push.strict_error;
   results[at] = any ? floatBitsToUint(float(a.height)) : kNan;
-  if (push.bound_at != 0) results[push.bound_at + at] = any ? floatBitsToUint(float(a.bound)) : kNan;
-  if (push.source_at != 0) results[push.source_at + at] = any ? uint(a.source) : 0u;
+  if (kBound) results[push.bound_at + at] = any ? floatBitsToUint(float(a.bound)) : kNan;
+  if (kSource) results[push.source_at + at] = any ? uint(a.source) : 0u;
   if (kGradient) {
     results[push.gradient_at + 2 * at] = any ? floatBitsToUint(float(a.slope.x)) : kNan;
     results[push.gradient_at + 2 * at + 1] = any ? floatBitsToUint(float(a.slope.y)) : kNan;

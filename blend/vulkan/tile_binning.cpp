@@ -93,6 +93,8 @@ TileEntry make_entry(const Blend::Placed& p, SlotOf slot, const RasterFrame& f, 
   split(vc, e.whole_v[1], e.rest_v[1]), split(vr, e.whole_v[2], e.rest_v[2]);
   e.anchor_c = float(c), e.anchor_r = float(r);
   e.slot = float(slot.slot), e.height = float(slot.height - base);
+  e.quantum = float(p.quantum), e.origin = slot.origin, e.error = float(p.error);
+  e.grid = float(p.id.grid().value + 1);
   return e;
 }
 

@@ -24,8 +24,11 @@ struct TileEntry {
   float rest_u[3], anchor_r;
   float whole_v[3], slot;
   float rest_v[3], height;  ///< metres: of the patch's origin code, against the base
+  float quantum, origin;    ///< metres a code; the code
+  float error;              ///< metres, for the blend's smoothness
+  float grid;               ///< id + 1: 0 means that nothing answers, and the sign that a cell was filled
 };
-static_assert(sizeof(TileEntry) == 64);
+static_assert(sizeof(TileEntry) == 80);
 
 /// common.glsl: Tile.
 struct TileHeader {
@@ -44,6 +47,7 @@ struct TileBins {
 /// What a slot has of a patch (PatchPool::Resident).
 struct SlotOf {
   std::uint32_t slot;
+  float origin;
   double height;  ///< metres
 };
 

@@ -13,12 +13,12 @@ namespace patchwork {
 
 namespace {
 
-constexpr std::uint32_t kBlock = 16;  // common.glsl
+constexpr std::uint32_t kBlock = 8;  // common.glsl
 constexpr std::size_t kBatchPoints = std::size_t{1} << 20;
 constexpr std::size_t kBatchTiles = 32768;  // a dispatch may have 65535 groups along an axis
 constexpr std::uint64_t kListWords = std::uint64_t{1} << 24;
 
-SlotOf slot_of(const PatchPool::Resident& r) { return {r.slot, r.height}; }
+SlotOf slot_of(const PatchPool::Resident& r) { return {r.slot, r.origin, r.height}; }
 
 std::uint64_t list_words(std::span<const Candidates> chosen, std::uint64_t blocks) {
   std::uint64_t words = 0;
@@ -65,11 +65,12 @@ void VulkanBlend::Impl::remember_grids() {
 }
 
 void VulkanBlend::Impl::hold(std::span<const PatchId> patches) {
-  placed.clear();
+  placed.clear(), ragged = false;
   std::size_t needed = 0;
   for (const PatchId id : patches) {
     placed.push_back(place(db, id, options.smoothness));
     needed += PatchPool::slots_of(db, id);
+    ragged |= !is_plain(placed.back());
   }
   slots.assign(placed.size(), {});
   all_resident = needed <= pool->slots();
@@ -111,8 +112,8 @@ std::vector<Candidates> VulkanBlend::Impl::choose(const RasterFrame& lattice,
 }
 
 vk::Work VulkanBlend::Impl::tile_work(const RasterFrame& f, const TileBins& bins, int side,
-                                      Planes planes) const {
-  vk::Work work{.bins = &bins, .push = push()};
+                                      vk::Planes planes) const {
+  vk::Work work{.bins = &bins, .push = push(), .planes = planes, .ragged = ragged};
   vk::Push& p = work.push;
   p.x0 = f.x0, p.xc = f.xc, p.xr = f.xr, p.y0 = f.y0, p.yc = f.yc, p.yr = f.yr;
   p.side = std::uint32_t(side), p.blocks = (p.side + kBlock - 1) / kBlock;
@@ -120,7 +121,7 @@ vk::Work VulkanBlend::Impl::tile_work(const RasterFrame& f, const TileBins& bins
   std::uint32_t words = plane;
   if (planes.bound) p.bound_at = words, words += plane;
   if (planes.source) p.source_at = words, words += plane;
-  if (more.gradient) p.gradient_at = words, words += 2 * plane;
+  if (planes.gradient) p.gradient_at = words, words += 2 * plane;
   work.result_words = words;
   return work;
 }
@@ -134,9 +135,9 @@ void VulkanBlend::Impl::note(const vk::Frame& frame) {
   times.read_back += ms[4];
 }
 
-TileHeights VulkanBlend::Impl::heights_of(const vk::Frame& frame, int side, Planes planes) {
+TileHeights VulkanBlend::Impl::heights_of(const vk::Frame& frame, int side, vk::Planes planes) {
   const auto words = frame.results();
-  const std::size_t plane = words.size() / (1 + planes.bound + planes.source + 2 * more.gradient);
+  const std::size_t plane = words.size() / planes.words();
   const auto floats = [&](std::size_t at, std::size_t n) {
     return std::span(reinterpret_cast<const float*>(words.data()) + at, n);
   };
@@ -149,13 +150,14 @@ TileHeights VulkanBlend::Impl::heights_of(const vk::Frame& frame, int side, Plan
                    [&](std::uint32_t bits) { return source_of(bits); });
     out.source = sources, at += plane;
   }
-  if (more.gradient) out.gradient = floats(at, 2 * plane);
+  if (planes.gradient) out.gradient = floats(at, 2 * plane);
   return out;
 }
 
 // Two frames: while one runs on the device, the results of the other are taken and the next is prepared.
 BlendCounts VulkanBlend::Impl::run_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side,
-                                         Planes planes, const std::function<void(const TileHeights&)>& take) {
+                                         vk::Planes planes,
+                                         const std::function<void(const TileHeights&)>& take) {
   BlendCounts counts;
   Pending before;
   const auto collect = [&](const Pending& p) {
@@ -194,10 +196,13 @@ VulkanBlend::VulkanBlend(std::shared_ptr<Device> device, const Database& db, std
     : impl_(std::make_unique<Impl>(std::move(device), db, options, more)) {
   assert(options.smoothness >= 0 && options.smoothness <= 2 && more.tile > 0);
   impl_->remember_grids();
-  const Device::Impl& d = impl_->device->impl();
+  Device::Impl& d = impl_->device->impl();
   const std::size_t room = std::min(more.memory / PatchPool::kSlotBytes, impl_->device->most_patches());
   impl_->pool = std::make_unique<PatchPool>(impl_->device, db, room);
-  impl_->passes = std::make_unique<vk::Passes>(d, options.smoothness, impl_->priority(), more.gradient);
+  impl_->passes = d.passes[{options.smoothness, impl_->priority()}];
+  if (!impl_->passes)
+    impl_->passes = d.passes[{options.smoothness, impl_->priority()}] =
+        std::make_shared<vk::Passes>(d, options.smoothness, impl_->priority());
   for (auto& frame : impl_->frames)
     frame = std::make_unique<vk::Frame>(d, *impl_->passes, impl_->pool->impl());
   impl_->hold(patches);
@@ -213,7 +218,7 @@ std::uint64_t VulkanBlend::exact_points() const { return impl_->exact_points; }
 
 BlendCounts VulkanBlend::at_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side,
                                   const std::function<void(const TileHeights&)>& take) const {
-  return impl_->run_tiles(lattice, tiles, side, {}, take);
+  return impl_->run_tiles(lattice, tiles, side, {.gradient = impl_->more.gradient}, take);
 }
 
 }  // namespace patchwork

@@ -15,9 +15,9 @@ namespace patchwork {
 
 struct VulkanOptions {
   std::size_t memory = std::size_t{256} << 20;  ///< bytes: of the patch pool
-  int tile = 128;        ///< vertices along each side of at_pixels' tiles; bench: 64 0.95, 256 1.0 x its rate
-  bool classify = true;  ///< blocks leave out what does not reach them; the bits do not depend on it
-  bool choose = true;    ///< tiles do; else every point walks through all patches
+  int tile = 64;                                ///< vertices along each side of the tiles of at_pixels
+  bool classify = true;    ///< blocks leave out what does not reach them; the bits do not depend on it
+  bool choose = true;      ///< tiles do; else every point walks through all patches
   bool exact_rim = false;  ///< a tile's outermost vertices are evaluated in double: neighbours get equal bits
   bool gradient = false;   ///< for tiles: the slope too
 };
@@ -34,7 +34,7 @@ struct TileHeights {
   std::span<const float> gradient = {};       ///< dh/dx, dh/dy pairs
 };
 
-/// Pairs of a block of 16 x 16 vertices and a patch of its tile.
+/// Pairs of a block of 8 x 8 vertices and a patch of its tile.
 struct BlockShares {
   std::uint64_t out = 0, inside = 0, partial = 0;
 };

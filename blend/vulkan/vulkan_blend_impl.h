@@ -9,20 +9,16 @@
 namespace patchwork {
 
 struct VulkanBlend::Impl {
-  /// Planes of the results besides the height.
-  struct Planes {
-    bool bound = true, source = true;
-  };
-
   std::shared_ptr<Device> device;
   const Database& db;
   BlendOptions options;
   VulkanOptions more;
   std::vector<Blend::Placed> placed;
   std::vector<SlotOf> slots;  // of `placed`, of those that are resident
+  bool ragged = false;        // some patch has holes, or a rim beyond its samples
   bool all_resident = true;   // else each submission makes its own patches so
   std::unique_ptr<PatchPool> pool;
-  std::unique_ptr<vk::Passes> passes;
+  std::shared_ptr<vk::Passes> passes;
   std::unique_ptr<vk::Frame> frames[2];
   std::vector<std::int32_t> places;   // of a grid's id + 1: 1 + its place in Database::grids()
   std::vector<std::int32_t> sources;  // of the submission that is being taken
@@ -39,7 +35,7 @@ struct VulkanBlend::Impl {
   /// Makes the chosen patches resident; false if they do not fit and may be halved.
   bool hold_chosen(std::span<const Candidates> chosen, bool may_fail);
   vk::Push push() const;
-  vk::Work tile_work(const RasterFrame& lattice, const TileBins& bins, int side, Planes planes) const;
+  vk::Work tile_work(const RasterFrame& lattice, const TileBins& bins, int side, vk::Planes planes) const;
   std::vector<Candidates> choose(const RasterFrame& lattice, std::span<const Tile> tiles) const;
   void note(const vk::Frame& frame);
   std::int32_t source_of(std::uint32_t bits) const {
@@ -47,9 +43,9 @@ struct VulkanBlend::Impl {
     const auto id = std::size_t(std::abs(s));
     return id >= places.size() ? 0 : s < 0 ? -places[id] : places[id];
   }
-  BlendCounts run_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side, Planes planes,
+  BlendCounts run_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side, vk::Planes planes,
                         const std::function<void(const TileHeights&)>& take);
-  TileHeights heights_of(const vk::Frame& frame, int side, Planes planes);
+  TileHeights heights_of(const vk::Frame& frame, int side, vk::Planes planes);
 };
 
 /// What a submission counted joins the sum.

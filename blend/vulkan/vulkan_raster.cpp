@@ -101,7 +101,8 @@ double double_at(std::span<const std::uint32_t> words, std::size_t at) {
 }
 
 // Groups of points as tiles: a list of patches each, no lattice.
-TileBins bins_of(std::span<const PointGroups::Group> groups, std::span<const SlotOf> slots) {
+TileBins bins_of(std::span<const PointGroups::Group> groups, const std::vector<Blend::Placed>& placed,
+                 std::span<const SlotOf> slots) {
   TileBins bins;
   for (const auto& g : groups) {
     bins.tiles.push_back({std::uint32_t(bins.entries.size()),
@@ -110,7 +111,7 @@ TileBins bins_of(std::span<const PointGroups::Group> groups, std::span<const Slo
                           {.across = int(g.points.size()), .down = 1}});
     for (const std::uint32_t k : g.patches) {
       TileEntry e{};
-      e.slot = float(slots[k].slot);
+      e.slot = float(slots[k].slot), e.grid = float(placed[k].id.grid().value + 1);
       bins.entries.push_back(e);
     }
   }
@@ -145,7 +146,7 @@ void run_points(VulkanBlend::Impl& impl, std::span<const PointGroups::Group> gro
     run_points(impl, groups.subspan(half), x, y, out, counts);
     return;
   }
-  const TileBins bins = bins_of(groups, impl.slots);
+  const TileBins bins = bins_of(groups, impl.placed, impl.slots);
   std::vector<double> points(2 * kGroup * groups.size());
   std::uint64_t wanted = 0;
   for (std::size_t g = 0; g < groups.size(); ++g)
@@ -153,7 +154,7 @@ void run_points(VulkanBlend::Impl& impl, std::span<const PointGroups::Group> gro
       const std::uint32_t from = groups[g].points[k];
       points[2 * (kGroup * g + k)] = x[from], points[2 * (kGroup * g + k) + 1] = y[from];
     }
-  vk::Work work{.bins = &bins, .points = points, .push = impl.push()};
+  vk::Work work{.bins = &bins, .points = points, .push = impl.push()};  // its planes are of its own kind
   const std::uint32_t n = std::uint32_t(kGroup * groups.size());
   work.push.explicit_points = 1, work.push.bound_at = 2 * n, work.push.source_at = 4 * n;
   work.result_words = std::size_t{5} * n;

@@ -29,6 +29,7 @@ struct Patch {
   vec4 slope;
   float quantum, origin, volume, rim, error;
   int grid;
+  bool steep;
   mat2 turn;
 };
 
@@ -53,7 +54,7 @@ void load_rects(inout Patch p) {
   if (kPriority && kMode == kPlain) return;
   const vec4 numbers = texelFetch(records, r + 5);
   p.samples = rect_of(texelFetch(records, r + 3));
-  p.volume = numbers.x, p.rim = numbers.y, p.holes = int(numbers.z);
+  p.volume = numbers.x, p.rim = numbers.y, p.holes = int(numbers.z), p.steep = (uint(numbers.w) & 4u) != 0;
 }
 
 Place along(vec4 whole, vec4 rest, vec2 d) {
@@ -68,10 +69,10 @@ Jet height_of(Patch p, Place u, Place v) {
   return Jet(h, p.quantum * code.u, p.quantum * code.v);
 }
 
-struct Point { Sum sum; vec2 at; bool wanted, uncertain; };
+struct Point { Sum sum; vec2 at; bool wanted, uncertain, steep; };
 
 Point point_at(uint c, uint r, Tile tile) {
-  return Point(nothing(), vec2(c, r), c < tile.across && r < tile.down, false);
+  return Point(nothing(), vec2(c, r), c < tile.across && r < tile.down, false, false);
 }
 
 void compose(inout Point q, Patch p) {
@@ -94,6 +95,7 @@ void compose(inout Point q, Patch p) {
     }
   }
   add(q.sum, own, own, p.volume, height_of(p, u, v), error, real_cell ? p.grid : -p.grid, p.turn);
+  q.steep = q.steep || (kMode == kHoles && p.steep);
 }
 
 bool on_exact_rim(Point q, Tile tile) {
@@ -129,7 +131,7 @@ void copy(Point q, Patch p, uint t, Tile tile, inout Counted n) {
 }
 
 void write_sum(Point q, uint t, Tile tile, inout Counted n) {
-  write(q, t, tile, finish(q.sum), q.sum.reads, q.uncertain && !(q.sum.plain >= kUncertain), n);
+  write(q, t, tile, finish(q.sum), q.sum.reads, q.steep || (q.uncertain && !(q.sum.plain >= kUncertain)), n);
 }
 
 void count(Counted n) {
@@ -144,7 +146,7 @@ void count(Counted n) {
 void main() {
   const uint item = gl_WorkGroupID.x * 4 + gl_LocalInvocationID.x / 16, blocks = push.blocks * push.blocks;
   if (item >= modes.counts[kMode]) return;
-  const uint number = work[kMode * tiles.length() * blocks + item], t = number / blocks, block = number % blocks;
+  const uint number = work[kMode * push.tiles * blocks + item], t = number / blocks, block = number % blocks;
   const Tile tile = tiles[t];
   const uint from = tile.lists + block * (tile.count + 1);
   const uint column = block % push.blocks * kBlock + gl_LocalInvocationID.x % 8;

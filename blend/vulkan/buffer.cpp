@@ -105,6 +105,12 @@ void Commands::wait() {
   device_.check(vkResetFences(device_.get(), 1, &fence), "waiting for the device");
 }
 
+void Commands::abandon() noexcept {
+  const VkFence fence = fence_.get();
+  if (running_) vkWaitForFences(device_.get(), 1, &fence, VK_TRUE, UINT64_MAX);
+  running_ = false;
+}
+
 void barrier(VkCommandBuffer commands) {
   VkMemoryBarrier memory{};
   memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;

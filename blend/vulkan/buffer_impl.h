@@ -41,10 +41,13 @@ OwnedView texels(const Device::Impl& device, const Buffer& buffer, VkFormat form
 class Commands {
  public:
   explicit Commands(const Device::Impl& device);
+  ~Commands() { abandon(); }
   /// Waits for what was submitted last, then starts anew.
   VkCommandBuffer begin();
   void submit();
   void wait();  ///< throws Error: the device was lost
+  /// Waits whatever becomes of the device: what the commands use may go afterwards.
+  void abandon() noexcept;
   VkCommandBuffer get() const { return commands_; }
 
  private:

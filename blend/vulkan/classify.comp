@@ -27,14 +27,14 @@ const uint kBlocksAGroup = 4;
 
 void list_work(int mode, uint number) {
   const uint n = atomicAdd(modes.counts[mode], 1);
-  work[mode * tiles.length() * push.blocks * push.blocks + n] = number;
+  work[mode * push.tiles * push.blocks * push.blocks + n] = number;
   if (n % kBlocksAGroup == 0) atomicAdd(modes.groups[3 * mode], 1);
 }
 
 void main() {
   const uint blocks = push.blocks * push.blocks, number = gl_GlobalInvocationID.x, block = number % blocks;
   const uint t = number / blocks;
-  if (t >= tiles.length()) return;
+  if (t >= push.tiles) return;
   const Tile tile = tiles[t];
   const int c0 = int(block % push.blocks) * kBlock, r0 = int(block / push.blocks) * kBlock;
   const int c1 = min(c0 + kBlock, tile.across) - 1, r1 = min(r0 + kBlock, tile.down) - 1;
@@ -58,7 +58,7 @@ void main() {
     const bool holds = u.x > kernel.x + kRoom && u.y < kernel.z - kRoom && v.x > kernel.y + kRoom &&
                        v.y < kernel.w - kRoom;
     if (push.classify != 0 && kPriority && (kind & 1u) != 0 && holds) {
-      copied = kept == 1;
+      copied = kept == 1 && (kind & 4u) == 0;
       break;
     }
   }

@@ -65,6 +65,7 @@ layout(push_constant) uniform Push {
   float strict_error;  // infinity: answers are given at any error
   uint explicit_points;  // not 0: points in groups of 64, a tile each; results in double
   uint classify;       // 0: every entry of a tile goes to every block
+  uint tiles;          // how many there are; their buffer may be larger
   uint exact_rim;      // not 0: points on the tile's border are evaluated in double
 } push;
 

@@ -16,7 +16,7 @@ struct Push {
   double x0, xc, xr, y0, yc, yr, base;
   std::uint32_t side, blocks, bound_at, source_at, gradient_at;
   float strict_error;
-  std::uint32_t explicit_points, classify, exact_rim, unused;
+  std::uint32_t explicit_points, classify, tiles, exact_rim;
 };
 static_assert(sizeof(Push) == 96);
 
@@ -71,6 +71,7 @@ struct Work {
 class Frame {
  public:
   Frame(const Device::Impl& device, Passes& passes, const PatchPool::Impl& pool);
+  ~Frame() { commands_.abandon(); }
   /// REQUIRES: the results of the submission before are no longer needed.
   void submit(const Work& work);
   /// Waits for the submission. Throws Error: the device was lost.

@@ -19,13 +19,27 @@ void put(T (&to)[4], const LatticeRect& r) {
   to[0] = T(r.i0), to[1] = T(r.j0), to[2] = T(r.i1), to[3] = T(r.j1);
 }
 
-PatchRecord32 record32(const Blend::Placed& p, const PatchPool::Resident& r) {
+// Metres: an interpolant of smoothness 2 rounds by some 3e-7 of the differences that it is made of.
+constexpr double kSteepDifference = 1000;
+
+bool is_steep(const PatchSurface& s, double quantum) {
+  constexpr std::size_t side = PatchSurface::kSide;
+  float most = 0;
+  for (std::size_t k = 0; k < kSamples; ++k) {
+    if (k % side > 0) most = std::max(most, std::abs(s.codes[k] - s.codes[k - 1]));
+    if (k >= side) most = std::max(most, std::abs(s.codes[k] - s.codes[k - side]));
+  }
+  return double(most) * quantum > kSteepDifference;
+}
+
+PatchRecord32 record32(const Blend::Placed& p, const PatchPool::Resident& r, bool steep) {
   PatchRecord32 out{};
   put(out.kernel, p.kernel), put(out.ramp, p.ramp), put(out.domain, p.domain), put(out.samples, p.samples);
   out.slope[0] = float(1 / (p.kernel.i0 - p.ramp.i0)), out.slope[1] = float(1 / (p.kernel.j0 - p.ramp.j0));
   out.slope[2] = float(1 / (p.ramp.i1 - p.kernel.i1)), out.slope[3] = float(1 / (p.ramp.j1 - p.kernel.j1));
   out.volume = float(p.volume), out.rim = float(p.rim), out.holes = r.holes ? float(*r.holes) : -1;
-  out.kind = float((!p.ragged && p.kernel_is_sampled() ? kSolid : 0) | (is_plain(p) ? kPlain : 0));
+  out.kind = float((!p.ragged && p.kernel_is_sampled() ? kSolid : 0) | (is_plain(p) && !steep ? kPlain : 0) |
+                   (steep ? kSteep : 0));
   out.turn[0] = float(p.ua), out.turn[1] = float(p.ub), out.turn[2] = float(p.va), out.turn[3] = float(p.vb);
   return out;
 }
@@ -133,11 +147,12 @@ void PatchPool::add(PatchId id) {
     impl_->ring.write(to, VkDeviceSize{slot} * bytes.size(), bytes);
   };
   send(impl_->samples, r.slot, surface->codes);
+  r.steep = is_steep(*surface, placed.quantum);
   if (surface->holes) {
     r.holes = take_slot();
     send(impl_->samples, *r.holes, words_of(*surface->holes));
   }
-  const PatchRecord32 record[] = {record32(placed, r)};
+  const PatchRecord32 record[] = {record32(placed, r, r.steep)};
   const PatchRecord64 exact[] = {record64(placed, facts)};
   send(impl_->records, r.slot, record);
   send(impl_->exact, r.slot, exact);

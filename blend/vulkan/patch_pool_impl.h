@@ -19,7 +19,8 @@ static_assert(sizeof(PatchRecord32) == 7 * 16);
 
 enum PatchKind {
   kSolid = 1,  ///< in its kernel it answers alone: no holes, and its samples reach beyond it
-  kPlain = 2   ///< no holes, and samples everywhere
+  kPlain = 2,  ///< no holes, samples everywhere, and not steep
+  kSteep = 4   ///< neighbouring samples differ by so much that float32 would not do between them
 };
 
 /// The same in double, for exact.comp.
@@ -30,7 +31,7 @@ struct PatchRecord64 {
 };
 static_assert(sizeof(PatchRecord64) == 32 * 8);
 
-/// What PatchKind::kPlain says.
+/// No holes, and samples everywhere.
 bool is_plain(const Blend::Placed& p);
 
 struct PatchPool::Impl {

@@ -18,8 +18,6 @@ constexpr std::size_t kBatchPoints = std::size_t{1} << 20;
 constexpr std::size_t kBatchTiles = 32768;  // a dispatch may have 65535 groups along an axis
 constexpr std::uint64_t kListWords = std::uint64_t{1} << 24;
 
-SlotOf slot_of(const PatchPool::Resident& r) { return {r.slot, r.origin, r.height}; }
-
 std::uint64_t list_words(std::span<const Candidates> chosen, std::uint64_t blocks) {
   std::uint64_t words = 0;
   for (const Candidates& c : chosen) words += blocks * (c.size() + 1);
@@ -76,7 +74,13 @@ void VulkanBlend::Impl::hold(std::span<const PatchId> patches) {
   all_resident = needed <= pool->slots();
   if (!all_resident) return;
   pool->hold(patches);
-  for (std::size_t k = 0; k < placed.size(); ++k) slots[k] = slot_of(pool->at(patches[k]));
+  for (std::size_t k = 0; k < placed.size(); ++k) remember(std::uint32_t(k));
+}
+
+void VulkanBlend::Impl::remember(std::uint32_t k) {
+  const PatchPool::Resident& r = pool->at(placed[k].id);
+  slots[k] = {r.slot, r.origin, r.height};
+  ragged |= r.steep;
 }
 
 bool VulkanBlend::Impl::hold_chosen(std::span<const Candidates> chosen, bool may_fail) {
@@ -91,7 +95,7 @@ bool VulkanBlend::Impl::hold_chosen(std::span<const Candidates> chosen, bool may
     patches.push_back(placed[k].id), needed += PatchPool::slots_of(db, placed[k].id);
   if (needed > pool->slots() && may_fail) return false;
   pool->hold(patches);
-  for (const std::uint32_t k : wanted) slots[k] = slot_of(pool->at(placed[k].id));
+  for (const std::uint32_t k : wanted) remember(k);
   return true;
 }
 
@@ -116,7 +120,8 @@ vk::Work VulkanBlend::Impl::tile_work(const RasterFrame& f, const TileBins& bins
   vk::Work work{.bins = &bins, .push = push(), .planes = planes, .ragged = ragged};
   vk::Push& p = work.push;
   p.x0 = f.x0, p.xc = f.xc, p.xr = f.xr, p.y0 = f.y0, p.yc = f.yc, p.yr = f.yr;
-  p.side = std::uint32_t(side), p.blocks = (p.side + kBlock - 1) / kBlock;
+  p.tiles = std::uint32_t(bins.tiles.size()), p.side = std::uint32_t(side),
+  p.blocks = (p.side + kBlock - 1) / kBlock;
   const std::uint32_t plane = std::uint32_t(bins.tiles.size()) * p.side * p.side;
   std::uint32_t words = plane;
   if (planes.bound) p.bound_at = words, words += plane;

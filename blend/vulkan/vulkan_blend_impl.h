@@ -15,7 +15,7 @@ struct VulkanBlend::Impl {
   VulkanOptions more;
   std::vector<Blend::Placed> placed;
   std::vector<SlotOf> slots;  // of `placed`, of those that are resident
-  bool ragged = false;        // some patch has holes, or a rim beyond its samples
+  bool ragged = false;        // some patch is not PatchKind::kPlain
   bool all_resident = true;   // else each submission makes its own patches so
   std::unique_ptr<PatchPool> pool;
   std::shared_ptr<vk::Passes> passes;
@@ -32,6 +32,7 @@ struct VulkanBlend::Impl {
   bool priority() const { return options.composition == Composition::priority; }
   void remember_grids();
   void hold(std::span<const PatchId> patches);
+  void remember(std::uint32_t k);  ///< where the pool has patch k
   /// Makes the chosen patches resident; false if they do not fit and may be halved.
   bool hold_chosen(std::span<const Candidates> chosen, bool may_fail);
   vk::Push push() const;

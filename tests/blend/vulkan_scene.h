@@ -34,6 +34,9 @@ inline double parity(double height) { return 1e-3 + 1e-6 * std::abs(height); }
 struct ParityFigures {
   std::size_t points = 0, answered = 0;
   double worst = 0;  ///< largest difference, in limits
+  void add(const ParityFigures& o) {
+    points += o.points, answered += o.answered, worst = std::max(worst, o.worst);
+  }
 };
 
 /// Where the two differ by more than parity allows, or one answers and the other does not.

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <map>
 
+#include "blend/vulkan/vulkan_blend.h"
+
 namespace patchwork::cli {
 
 CLI::App* verb(CLI::App& app, Common& common, const std::string& name, const std::string& what) {
@@ -49,7 +51,7 @@ void SurfaceOptions::add_to(CLI::App& v) {
   v.add_option("--error", error, "largest error that you accept, metres; 0 means the best there is");
   v.add_option("--smoothness", smoothness, "k: derivatives that are continuous")->check(CLI::Range(0, 2));
   v.add_option("--blend", blend, "how patches are composed")->check(CLI::IsMember({"priority", "weighted"}));
-  v.add_option("--engine", engine, "where the surface is evaluated")->check(CLI::IsMember({"cpu"}));
+  v.add_option("--engine", engine, "where the surface is evaluated")->check(CLI::IsMember({"cpu", "vulkan"}));
   v.add_flag("--strict", strict, "no data where the error is not available, instead of the best there is");
 }
 
@@ -58,6 +60,18 @@ BlendOptions SurfaceOptions::blend_options() const {
           .composition = blend == "weighted" ? Composition::weighted : Composition::priority,
           .strict = strict,
           .error = error};
+}
+
+std::unique_ptr<Evaluator> make_evaluator(const Database& db, std::span<const PatchId> patches,
+                                          const SurfaceOptions& options, std::uint64_t memory) {
+  if (options.engine == "cpu") return std::make_unique<Blend>(db, patches, options.blend_options());
+  return std::make_unique<VulkanBlend>(Device::open(), db, patches, options.blend_options(),
+                                       VulkanOptions{.memory = memory / 4});
+}
+
+std::string engine_name(const Evaluator& evaluator) {
+  const auto* card = dynamic_cast<const VulkanBlend*>(&evaluator);
+  return card ? card->device().name() : "cpu";
 }
 
 void RegionOptions::add_to(CLI::App& v, bool with_polygon) {

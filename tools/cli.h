@@ -5,7 +5,9 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -66,6 +68,12 @@ struct SurfaceOptions {
   void add_to(CLI::App& verb);
   BlendOptions blend_options() const;
 };
+
+/// The engine that the options name. REQUIRES: `db` outlives it. Throws Error: no device, no memory on it.
+std::unique_ptr<Evaluator> make_evaluator(const Database& db, std::span<const PatchId> patches,
+                                          const SurfaceOptions& options, std::uint64_t memory);
+/// "cpu", or the name of the graphics card.
+std::string engine_name(const Evaluator& evaluator);
 
 /// The region options of a query: --extent and --polygon.
 struct RegionOptions {

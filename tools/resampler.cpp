@@ -36,7 +36,7 @@ double finest_step(const Database& db, const Extent& extent) {
   return finest;
 }
 
-Resampler::Resampler(const Blend& blend, const Raster& raster, std::vector<std::string> bands,
+Resampler::Resampler(const Evaluator& blend, const Raster& raster, std::vector<std::string> bands,
                      std::size_t memory)
     : blend_(blend), raster_(raster), bands_(std::move(bands)) {
   const std::size_t pixels = size_t(raster.width) * size_t(raster.height);

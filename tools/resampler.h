@@ -38,13 +38,13 @@ class Resampler {
  public:
   /// Evaluates all at once if the raster fits into a quarter of `memory` (bytes), else rows as they are asked
   /// for.
-  Resampler(const Blend& blend, const Raster& raster, std::vector<std::string> bands, std::size_t memory);
+  Resampler(const Evaluator& blend, const Raster& raster, std::vector<std::string> bands, std::size_t memory);
   void rows(int factor, int row, int rows, std::span<float* const> bands);
   const ResampleTally& tally() const { return tally_; }
 
  private:
   void evaluate(int factor, int row, int rows, std::span<float* const> bands);
-  const Blend& blend_;
+  const Evaluator& blend_;
   Raster raster_;
   std::vector<std::string> bands_;
   ResampleTally tally_;

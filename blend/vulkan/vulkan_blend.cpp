@@ -216,6 +216,7 @@ VulkanBlend::VulkanBlend(std::shared_ptr<Device> device, const Database& db, std
 VulkanBlend::~VulkanBlend() = default;
 
 void VulkanBlend::change(std::span<const PatchId> patches) { impl_->hold(patches); }
+const Device& VulkanBlend::device() const { return *impl_->device; }
 const PatchPool& VulkanBlend::pool() const { return *impl_->pool; }
 BlockShares VulkanBlend::shares() const { return impl_->shares; }
 VulkanBlend::Times VulkanBlend::times() const { return impl_->times; }

@@ -63,6 +63,7 @@ class VulkanBlend : public Evaluator {
   BlendCounts at_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side,
                        const std::function<void(const TileHeights&)>& take) const;
 
+  const Device& device() const;
   const PatchPool& pool() const;
   BlockShares shares() const;  ///< of all tiles so far
   /// Of all submissions so far, on the device, milliseconds.

@@ -171,4 +171,27 @@ TEST_F(Resample, SmoothnessBlendAndCompressionAreTaken) {
   EXPECT_EQ(different, 0u) << "compression is lossless";
 }
 
+TEST_F(Resample, OnTheGraphicsCardTheHeightsAreTheCpus) {
+  for (const char* smoothness : {"0", "2"}) {
+    const Words options{"--step",       "2.5",      "--bands", "height,bound,source",
+                        "--smoothness", smoothness, "--json"};
+    const Json cpu = json(command(options));
+    std::vector<std::vector<float>> want;
+    for (int b = 1; b <= 3; ++b) want.push_back(band(*opened(out_), b));
+    Words words = options;
+    words.insert(words.end(), {"--engine", "vulkan"});
+    const Json gpu = json(command(words));
+    EXPECT_EQ(gpu["samples"], cpu["samples"]);
+    EXPECT_EQ(cpu["engine"], "cpu");
+    EXPECT_NE(gpu["engine"], "cpu");
+    for (int b = 1; b <= 3; ++b) {
+      const std::vector<float> got = band(*opened(out_), b);
+      for (std::size_t k = 0; k < got.size(); ++k)
+        ASSERT_TRUE(std::abs(got[k] - want[size_t(b - 1)][k]) <= 2e-3 ||
+                    (std::isnan(got[k]) && std::isnan(want[size_t(b - 1)][k])))
+            << "band " << b << " pixel " << k << ": " << got[k] << " " << want[size_t(b - 1)][k];
+    }
+  }
+}
+
 }  // namespace patchwork

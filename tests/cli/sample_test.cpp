@@ -115,4 +115,28 @@ TEST_F(Sample, KeepsItsBoundAtEveryErrorSmoothnessAndBlend) {
       }
 }
 
+TEST_F(Sample, OnTheGraphicsCardTheAnswersAreTheCpus) {
+  std::string points;
+  for (int k = 0; k < 500; ++k)
+    points += std::to_string(500000 + 3.7 * k) + " " + std::to_string(5000000 - 2.9 * k) + "\n";
+  points += "0 0\nnan 5\n";
+  const Words cpu = sample(points), gpu = sample(points, {"--engine", "vulkan"});
+  ASSERT_EQ(cpu.size(), gpu.size());
+  for (std::size_t k = 0; k < cpu.size(); ++k) {
+    const Words a = fields(cpu[k]), b = fields(gpu[k]);
+    EXPECT_EQ(a[4], b[4]) << "the same grid answers";
+    if (a[2] != "nan") {
+      EXPECT_NEAR(std::stod(a[2]), std::stod(b[2]), 1e-6);
+    }
+  }
+}
+
+TEST_F(Sample, ADeviceThatIsNotThereIsNamed) {
+  setenv("PATCHWORK_DEVICE", "no such card", 1);
+  const Outcome o = run({"sample", database_, "--engine", "vulkan"}, {.input = "500105 4999895\n"});
+  unsetenv("PATCHWORK_DEVICE");
+  EXPECT_EQ(o.code, 1);
+  EXPECT_NE(o.err.find("no such card"), std::string::npos) << o.err;
+}
+
 }  // namespace patchwork

@@ -57,7 +57,7 @@ std::string title(const Options& o, const Extraction& x) {
                      o.surface.blend);
 }
 
-void draw_hillshade(const Blend& blend, const Raster& r, const Options& o, const Extraction& x) {
+void draw_hillshade(const Evaluator& blend, const Raster& r, const Options& o, const Extraction& x) {
   std::vector<double> height(size_t(r.width) * size_t(r.height));
   blend.at_pixels(r.frame(), r.width, 0, r.height,
                   {.height = height, .bound = {}, .source = {}, .patch = {}});
@@ -134,8 +134,8 @@ void run(const Options& o, const Common& common) {
   const double open_seconds = seconds_since(start);
   const Extraction x = extract(db, {.error = o.surface.error, .region = Region::inside(extent)});
   const double fetch_seconds = prefetch(db, x.patches, common.memory);
-  const Blend blend(db, x.patches, o.surface.blend_options());
-  Resampler resampler(blend, raster, o.bands, common.memory);
+  const std::unique_ptr<Evaluator> blend = make_evaluator(db, x.patches, o.surface, common.memory);
+  Resampler resampler(*blend, raster, o.bands, common.memory);
   const auto writing = std::chrono::steady_clock::now();
   {
     ProgressBar bar(common, "resample", double(raster.width) * raster.height / 1e6, "Mpx");
@@ -149,15 +149,15 @@ void run(const Options& o, const Common& common) {
   const double write_seconds = seconds_since(writing) - resampler.tally().blend_seconds;
   const auto drawing = std::chrono::steady_clock::now();
   const Raster small = picture_raster(raster);
-  if (!o.hillshade.empty()) draw_hillshade(blend, small, o, x);
-  if (!o.map.empty()) draw_map(db, blend, small, o, x);
+  if (!o.hillshade.empty()) draw_hillshade(*blend, small, o, x);
+  if (!o.map.empty()) draw_map(db, Blend(db, x.patches, o.surface.blend_options()), small, o, x);
   const BlendCounts& c = resampler.tally().full;
   const double mean = c.points ? double(c.contributions) / double(c.points) : 0;
   const double seconds = seconds_since(start);
   if (common.json) {
     Json j{{"seconds", seconds},       {"samples", c.points},       {"patches", x.patches.size()},
            {"bound_max", c.bound_max}, {"contributors_mean", mean}, {"contributors_max", c.most},
-           {"width", raster.width},    {"height", raster.height}};
+           {"width", raster.width},    {"height", raster.height},   {"engine", engine_name(*blend)}};
     j["stages"] = {{"open", open_seconds},   {"query", x.cost.seconds},
                    {"fetch", fetch_seconds}, {"blend", resampler.tally().blend_seconds},
                    {"write", write_seconds}, {"pictures", seconds_since(drawing)}};

@@ -39,10 +39,10 @@ bool parse(std::string_view token, double& value) {
 
 class Sampler {
  public:
-  Sampler(const Database& db, const Options& o)
+  Sampler(const Database& db, const Options& o, std::uint64_t memory)
       : db_(db),
         patches_(extract(db, {.error = o.surface.error}).patches),
-        blend_(db, patches_, o.surface.blend_options()) {}
+        blend_(make_evaluator(db, patches_, o.surface, memory)) {}
 
   // The first line may be a header: then columns named x and y (or the first two) are taken.
   void read(std::istream& in) {
@@ -73,8 +73,8 @@ class Sampler {
   /// How many points there were, and how many patches were read for one.
   std::string summary() const {
     const double mean = counts_.points ? double(counts_.contributions) / double(counts_.points) : 0;
-    return fmt::format("{} points from {} patches; {:.3f} patches read a point, {} at most", counts_.points,
-                       patches_.size(), mean, counts_.most);
+    return fmt::format("{} points from {} patches on {}; {:.3f} patches read a point, {} at most",
+                       counts_.points, patches_.size(), engine_name(*blend_), mean, counts_.most);
   }
 
  private:
@@ -92,7 +92,7 @@ class Sampler {
   void flush() {
     height_.resize(x_.size()), bound_.resize(x_.size()), source_.resize(x_.size());
     const BlendCounts c =
-        blend_.at_points(x_, y_, {.height = height_, .bound = bound_, .source = source_, .patch = {}});
+        blend_->at_points(x_, y_, {.height = height_, .bound = bound_, .source = source_, .patch = {}});
     counts_.points += c.points, counts_.contributions += c.contributions,
         counts_.most = std::max(counts_.most, c.most);
     fmt::memory_buffer out;
@@ -112,7 +112,7 @@ class Sampler {
 
   const Database& db_;
   std::vector<PatchId> patches_;
-  Blend blend_;
+  std::unique_ptr<Evaluator> blend_;
   int columns_[2] = {0, 1};
   std::vector<double> x_, y_, height_, bound_;
   std::vector<std::int32_t> source_;
@@ -130,7 +130,7 @@ void add_sample(CLI::App& app, Common& common) {
   v->callback([o, &common] {
     const Database db = Database::open(o->database, common.memory);
     std::ios::sync_with_stdio(false);
-    Sampler sampler(db, *o);
+    Sampler sampler(db, *o, common.memory);
     sampler.read(std::cin);
     note(common, sampler.summary());
   });

@@ -62,10 +62,23 @@ struct CorridorCut {
   bool strict = false;
 };
 
-/// Throw Error: a number that is none or negative, a view without extent, a line of less than two points.
+/// A raster of tolerances, metres: pixel (i, j) speaks for the square around frame.to_domain(i, j); NaN and
+/// what lies beyond the raster mean `outside`.
+struct FieldCut {
+  Frame frame = {};
+  int width = 0, height = 0;
+  std::vector<float> tolerance;  ///< row-major, width x height
+  double outside = 0;
+  Region region = {};
+  bool strict = false;
+};
+
+/// Throw Error: a number that is none or negative, a view without extent, a line of less than two points, a
+/// field that is not width x height.
 std::unique_ptr<CutSurface> make_surface(const UniformCut& cut);
 std::unique_ptr<CutSurface> make_surface(const ViewCut& cut);
 std::unique_ptr<CutSurface> make_surface(const CorridorCut& cut);
+std::unique_ptr<CutSurface> make_surface(const FieldCut& cut);
 
 /// The same view with `far`, `lowest` and `highest` such that it sees all that the database holds.
 ViewCut over_terrain_of(const Database& db, ViewCut cut);

@@ -31,7 +31,7 @@ struct Extraction {
 Extraction extract(const Database& db, const CutSurface& cut, bool strict = false);
 /// Throw Error for cuts that are none (see make_surface).
 Extraction extract(const Database& db, const UniformCut& cut);
-template <class Cut>  // ViewCut, CorridorCut; a template, so that braces mean a uniform cut
+template <class Cut>  // ViewCut, CorridorCut, FieldCut; a template, so that braces mean a uniform cut
 requires requires(const Cut& cut) { make_surface(cut), cut.strict; }
 Extraction extract(const Database& db, const Cut& cut) { return extract(db, *make_surface(cut), cut.strict); }
 

@@ -186,6 +186,27 @@ TEST(LodTree, AgreesWithScanningEveryBoxWhenAllAreTheSame) {
   EXPECT_FALSE(tree.erase(one));
 }
 
+VisitCost cost_of(const LodTree& tree, Boxes boxes) {
+  VisitCost sum;
+  for (int i = 0; i < 500; ++i) {
+    const Extent region = boxes.region();
+    const VisitCost c = tree.visit_uniform(region, boxes.error(), [](const Entry&) {});
+    sum.nodes += c.nodes, sum.boxes += c.boxes;
+  }
+  return sum;
+}
+
+TEST(LodTree, TenThousandChangesKeepItAlmostAsTightAsBuiltAnew) {
+  Boxes boxes(seed());
+  std::vector<Entry> all = boxes.take(30000);
+  LodTree tree = LodTree::build(all);
+  change(tree, all, boxes, 10000, 8);
+  const VisitCost changed = cost_of(tree, boxes), anew = cost_of(LodTree::build(all), boxes);
+  EXPECT_LE(double(changed.nodes), 1.3 * double(anew.nodes));
+  EXPECT_LE(double(changed.boxes), 1.3 * double(anew.boxes));
+  EXPECT_GT(tree.shape().fill, 0.6);
+}
+
 TEST(LodTree, HitsAreClosedInPlaceAndHalfOpenInError) {
   LodTree tree;
   tree.insert({{0, 0, 1, 1, 0.1f, 0.2f}, {1}});

@@ -39,6 +39,19 @@ class Random {
     v.lowest = -60, v.highest = 250;
     return v;
   }
+  FieldCut field(double side) {
+    const double angle = uniform(0, 7), step = uniform(0.002, 0.03) * side;
+    FieldCut f{
+        .frame = Frame::from_trusted({uniform(-side, side), step * std::cos(angle), -step * std::sin(angle),
+                                      uniform(-side, side), step * std::sin(angle), step * std::cos(angle)}),
+        .width = 1 + int(below(90)),
+        .height = 1 + int(below(90)),
+        .tolerance = {},
+        .outside = uniform(0, 50)};
+    for (int k = 0; k < f.width * f.height; ++k)
+      f.tolerance.push_back(below(9) == 0 ? NAN : float(std::exp2(uniform(-3, 6))));
+    return f;
+  }
   CorridorCut corridor(double side) {
     CorridorCut c;
     for (int k = 0; k < 4; ++k) c.line.push_back({uniform(-side, side), uniform(-side, side)});
@@ -57,7 +70,7 @@ class Random {
 std::unique_ptr<CutSurface> any_cut(Random& random, double side, int kind) {
   if (kind == 0) return make_surface(random.uniform_cut(side));
   if (kind == 1) return make_surface(random.view(side));
-  return make_surface(random.corridor(side));
+  return kind == 3 ? make_surface(random.field(side)) : make_surface(random.corridor(side));
 }
 
 // --- Boxes alone: what a page's vector code accepts against the cut's own range and region, box by box.
@@ -103,7 +116,8 @@ class LodTreeCuts : public testing::TestWithParam<int> {};
 TEST_P(LodTreeCuts, AgreeWithScanningEveryBoxBeforeAndAfterChanges) {
   Random random(test_seed(1));
   std::vector<LodEntry> all;
-  for (std::uint64_t k = 0; k < 20000; ++k) all.push_back(random_box(random, k));
+  const std::uint64_t boxes = trials(0) >= 10000 ? 100000 : 20000;
+  for (std::uint64_t k = 0; k < boxes; ++k) all.push_back(random_box(random, k));
   LodTree tree = LodTree::build(all);
   std::size_t found = 0, spare = 0;
   for (int n = 0; n < trials(60); ++n) {
@@ -112,7 +126,7 @@ TEST_P(LodTreeCuts, AgreeWithScanningEveryBoxBeforeAndAfterChanges) {
     for (int change = 0; change < 30; ++change) {
       std::swap(all[random.below(all.size())], all.back());
       ASSERT_TRUE(tree.erase(all.back()));
-      all.back() = random_box(random, 100000 + std::uint64_t(n) * 100 + std::uint64_t(change));
+      all.back() = random_box(random, 1000000 + std::uint64_t(n) * 100 + std::uint64_t(change));
       tree.insert(all.back());
     }
   }
@@ -120,7 +134,7 @@ TEST_P(LodTreeCuts, AgreeWithScanningEveryBoxBeforeAndAfterChanges) {
   EXPECT_LE(double(spare), 0.25 * double(found) + 100) << "boxes near the sides of a view, no more";
 }
 
-INSTANTIATE_TEST_SUITE_P(UniformViewCorridor, LodTreeCuts, testing::Range(0, 3));
+INSTANTIATE_TEST_SUITE_P(UniformViewCorridorField, LodTreeCuts, testing::Range(0, 4));
 
 // --- Extractions of a database.
 
@@ -170,7 +184,7 @@ TEST_F(CutTest, ExtractionsAgreeWithScanningEveryPatch) {
   Random random(test_seed(2));
   std::size_t found = 0;
   for (int n = 0; n < trials(300); ++n) {
-    const auto cut = any_cut(random, 2000, n % 3);
+    const auto cut = any_cut(random, 2000, n % 4);
     const bool strict = n % 2;
     const std::vector<PatchId> ids = sorted(extract(*db_, *cut, strict).patches);
     ASSERT_EQ(ids, scanned(*cut, strict)) << n;
@@ -183,7 +197,7 @@ TEST_F(CutTest, RangesHoldEveryToleranceInside) {
   Random random(test_seed(3));
   int narrow = 0;
   for (int n = 0; n < 2000; ++n) {
-    const auto cut = any_cut(random, 2000, 1 + n % 2);
+    const auto cut = any_cut(random, 2000, 1 + n % 3);
     const double angle = random.uniform(0, 7), step = random.uniform(1, 20);
     const Frame frame =
         Frame::from_trusted({random.uniform(-2000, 2000), step * std::cos(angle), -step * std::sin(angle),
@@ -260,6 +274,27 @@ TEST_F(CutTest, NeighbouringRegionsOfOneCutTakeTheSamePatchesWhereTheyOverlap) {
   }
 }
 
+TEST_F(CutTest, AFieldSaysWhatItsPixelsSay) {
+  const FieldCut f{.frame = Frame::from_trusted({100, 10, 0, 200, 0, -10}),
+                   .width = 2,
+                   .height = 2,
+                   .tolerance = {1, 2, 3, NAN},
+                   .outside = 9};
+  const auto cut = make_surface(f);
+  EXPECT_EQ(cut->at({100, 200}), 1);
+  EXPECT_EQ(cut->at({104.9, 195.1}), 1);
+  EXPECT_EQ(cut->at({105.1, 200}), 2);
+  EXPECT_EQ(cut->at({100, 190}), 3);
+  EXPECT_EQ(cut->at({110, 190}), 9);
+  EXPECT_EQ(cut->at({94, 200}), 9);
+  const ToleranceRange left = cut->over(f.frame, {-0.4, -0.4, 0.4, 1.4}),
+                       all = cut->over(f.frame, {-9, -9, 9, 9});
+  EXPECT_EQ(left.low, 1);
+  EXPECT_EQ(left.high, 3);
+  EXPECT_EQ(all.low, 1);
+  EXPECT_EQ(all.high, 9);
+}
+
 TEST_F(CutTest, ADifferenceTurnsOneAnswerIntoTheOther) {
   Random random(test_seed(6));
   Extraction before = extract(*db_, {.error = 3});
@@ -312,6 +347,10 @@ TEST_F(CutTest, WhatIsNoCutIsRefused) {
   EXPECT_NE(refused([](ViewCut& c) { c.far = 0; }), "");
   EXPECT_NE(refusal_of([] { make_surface(CorridorCut{.line = {{0, 0}}}); }), "");
   EXPECT_NE(refusal_of([] { make_surface(CorridorCut{.line = {{0, 0}, {1, 1}}, .ramp = -1}); }), "");
+  EXPECT_EQ(refusal_of([] { make_surface(FieldCut{.width = 1, .height = 1, .tolerance = {2}}); }), "");
+  EXPECT_NE(refusal_of([] { make_surface(FieldCut{.width = 1, .height = 2, .tolerance = {2}}); }), "");
+  EXPECT_NE(refusal_of([] { make_surface(FieldCut{.width = 1, .height = 1, .tolerance = {-2}}); }), "");
+  EXPECT_NE(refusal_of([] { make_surface(FieldCut{}); }), "");
 }
 
 }  // namespace

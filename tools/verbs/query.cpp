@@ -3,6 +3,8 @@
 
 #include <optional>
 
+#include "db/raster.h"
+#include "query/cost_model.h"
 #include "tools/cli.h"
 
 namespace patchwork::cli {
@@ -16,7 +18,12 @@ struct Options {
   RegionOptions region;
   std::vector<double> eye, look, size{1280, 720};
   double fov = 60, pixel_error = 1;
-  std::size_t patches = 0;  // the budget; 0: none
+  std::size_t patches = 0, bytes = 0;  // budgets; 0: none
+  double milliseconds = 0;
+  std::string field;
+  double outside = 0;
+  bool explain = false;
+  bool budgeted() const { return patches > 0 || bytes > 0 || milliseconds > 0; }
 };
 
 // What was asked for, in the unit of the cut: metres of a uniform cut, pixels of a view.
@@ -36,24 +43,88 @@ ViewCut view_of(const Database& db, const Options& o) {
                               .strict = o.strict});
 }
 
-Asked ask(const Database& db, const Options& o) {
+// The file's values are metres of tolerance.
+FieldCut field_of(const Database& db, const Options& o) {
+  const RasterSource file = RasterSource::open(o.field, {.accuracy = 0}, db.crs());
+  FieldCut cut{.frame = file.frame(),
+               .width = file.width(),
+               .height = file.height(),
+               .tolerance = {},
+               .outside = o.outside,
+               .region = o.region.region(),
+               .strict = o.strict};
+  std::vector<double> row(std::size_t(cut.width));
+  for (int j = 0; j < cut.height; ++j) {
+    file.read_rows(j, 1, row);
+    for (const double raw : row) cut.tolerance.push_back(float(raw * file.scale() + file.offset()));
+  }
+  return cut;
+}
+
+// How an error (metres, or pixels of a view) becomes a cut, and which error is asked for.
+struct Question {
+  std::function<std::unique_ptr<CutSurface>(double error)> cut_at;
+  double error = 0, most = 1;
+  const char* unit = "m";
+};
+
+Question question(const Database& db, const Options& o) {
   const bool view = !o.eye.empty();
   if (view && (o.error || !o.region.extent.empty() || !o.region.polygon.empty()))
     throw CLI::ValidationError("--eye", "a view brings its own error and region");
-  if (!view && !o.error && o.patches == 0)
-    throw CLI::RequiredError("--error, --eye with --look, or --patches");
-  ViewCut v = view ? view_of(db, o) : ViewCut{};
-  UniformCut u{o.error.value_or(0), o.region.region(), o.strict};
-  if (o.patches == 0)
-    return {view ? extract(db, v) : extract(db, u), view ? v.pixel_error : u.error, view ? "px" : "m"};
-  double most = view ? 4096 : 1;
-  for (const Grid& g : db.grids())
-    if (!view) most = std::max(most, 2 * g.patches[g.patches.size() - 1].bottom);
-  const Budgeted b = extract_within(db, {.patches = o.patches}, most, [&](double error) {
-    v.pixel_error = u.error = error;
-    return view ? make_surface(v) : make_surface(u);
-  });
-  return {b.extraction, b.error, view ? "px" : "m"};
+  if (!o.field.empty() && (view || o.error || o.budgeted()))
+    throw CLI::ValidationError("--field", "a field brings its own error, and has no budget");
+  if (!view && !o.error && o.field.empty() && !o.budgeted())
+    throw CLI::RequiredError("--error, --eye with --look, --field, --patches, --bytes or --milliseconds");
+  if (!o.field.empty())
+    return {[cut = field_of(db, o)](double) { return make_surface(cut); }, o.outside, o.outside, "m"};
+  if (view)
+    return {[v = view_of(db, o)](double error) mutable {
+              v.pixel_error = error;
+              return make_surface(v);
+            },
+            o.pixel_error, 4096, "px"};
+  double most = 1;
+  for (const Grid& g : db.grids()) most = std::max(most, 2 * g.patches[g.patches.size() - 1].bottom);
+  return {[u = UniformCut{0, o.region.region(), o.strict}](double error) mutable {
+            u.error = error;
+            return make_surface(u);
+          },
+          o.error.value_or(0), most, "m"};
+}
+
+Asked ask(const Database& db, const Options& o, const Question& q) {
+  if (!o.budgeted()) return {extract(db, *q.cut_at(q.error), o.strict), q.error, q.unit};
+  if (o.milliseconds > 0) {
+    const Budgeted b = extract_in_time(db, calibrate(db), o.milliseconds / 1000, q.most, q.cut_at);
+    return {b.extraction, b.error, q.unit};
+  }
+  const Budget budget{o.patches > 0 ? o.patches : SIZE_MAX, o.bytes > 0 ? o.bytes : SIZE_MAX};
+  const Budgeted b = extract_within(db, budget, q.most, q.cut_at);
+  return {b.extraction, b.error, q.unit};
+}
+
+Json json_of(const Cost& c) {
+  return {{"nodes", c.nodes},
+          {"boxes", c.boxes},
+          {"patches", c.patches},
+          {"bytes", c.bytes},
+          {"seconds", c.seconds}};
+}
+
+// What the answer will cost, without the answer.
+void explain(const Database& db, const Question& q, const Common& common) {
+  const CostModel model = calibrate(db);
+  const Cost c = expect(db, *q.cut_at(q.error), model);
+  if (common.json)
+    return print({{"error", q.error},
+                  {"unit", q.unit},
+                  {"expected", json_of(c)},
+                  {"model", {{"seconds", model.fixed}, {"page", model.page}, {"patch", model.patch}}}});
+  fmt::print("expected at error {:g} {}: {} patches, {:.2f} MB of samples, {:.3f} ms\n", q.error, q.unit,
+             c.patches, double(c.bytes) / 1e6, 1000 * c.seconds);
+  fmt::print("  {} pages and {} boxes of the R-tree; {:.3g} us + {:.3g} us a page + {:.3g} us a patch\n",
+             c.nodes, c.boxes, 1e6 * model.fixed, 1e6 * model.page, 1e6 * model.patch);
 }
 
 Json json_of(const Database& db, PatchId id) {
@@ -90,7 +161,9 @@ void print_text(const Database& db, const Asked& asked, const Options& o) {
 
 void run(const Options& o, const Common& common) {
   const Database db = Database::open(o.database, common.memory);
-  const Asked asked = ask(db, o);
+  const Question q = question(db, o);
+  if (o.explain) return explain(db, q, common);
+  const Asked asked = ask(db, o, q);
   const Extraction& x = asked.extraction;
   if (!common.json) return print_text(db, asked, o);
   Json j{{"patches", x.patches.size()},
@@ -100,11 +173,7 @@ void run(const Options& o, const Common& common) {
          {"by_grid", by_grid(db, x)},
          {"bound_max", x.bound_max},
          {"error_available", x.error_available}};
-  j["cost"] = {{"nodes", x.cost.nodes},
-               {"boxes", x.cost.boxes},
-               {"patches", x.cost.patches},
-               {"bytes", x.cost.bytes},
-               {"seconds", x.cost.seconds}};
+  j["cost"] = json_of(x.cost);
   if (o.list)
     for (const PatchId id : x.patches) j["list"].push_back(json_of(db, id));
   print(j);
@@ -124,6 +193,19 @@ void add_query(CLI::App& app, Common& common) {
   v->add_option("--size", o->size, "of the view: width height, pixels")->expected(2);
   v->add_option("--pixel-error", o->pixel_error, "largest error that you accept on the screen, pixels");
   v->add_option("--patches", o->patches, "a budget: the smallest error that needs no more patches");
+  v->add_option("--bytes", o->bytes, "a budget: the smallest error whose samples take no more memory");
+  v->add_option("--milliseconds", o->milliseconds, "a budget: the smallest error that is found in this time")
+      ->check(CLI::PositiveNumber)
+      ->excludes("--patches")
+      ->excludes("--bytes");
+  v->add_option("--field", o->field, "a raster of errors, metres, that each place may have")
+      ->check(CLI::ExistingFile);
+  v->add_option("--outside", o->outside, "the error beyond the field, and where it has no data")
+      ->needs("--field");
+  v->add_flag("--explain", o->explain, "what the answer will cost, and nothing else")
+      ->excludes("--patches")
+      ->excludes("--bytes")
+      ->excludes("--milliseconds");
   o->region.add_to(*v, true);
   v->add_flag("--strict", o->strict, "only patches of that error, not the best where it is not available");
   v->add_flag("--list", o->list, "every patch, in the order in which they speak");

@@ -1,0 +1,115 @@
+#include "query/cost_model.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+
+namespace patchwork {
+
+namespace {
+
+constexpr double kCalibration = 0.1;         // seconds
+constexpr double kUsed = 0.9;                // of a time budget, by what is expected
+constexpr double kRung = 1.189207115002721;  // a quarter octave
+constexpr int kRungs = 96;
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double largest_error(const Database& db) {
+  double most = 1;
+  for (const Grid& g : db.grids())
+    if (g.patches.size() > 0) most = std::max(most, 2 * g.patches[g.patches.size() - 1].bottom);
+  return most;
+}
+
+// Least squares of relative errors, with no cost below zero: what would be is left out.
+CostModel fit(const std::vector<Cost>& costs) {
+  std::array<bool, 3> used{true, true, true};
+  Eigen::Vector3d x;
+  do {
+    Eigen::MatrixXd a(Eigen::Index(costs.size()), 3);
+    for (Eigen::Index r = 0; r < a.rows(); ++r) {
+      const Cost& c = costs[std::size_t(r)];
+      a.row(r) << 1, double(c.nodes), double(c.patches);
+      a.row(r) /= c.seconds;
+    }
+    for (int k = 0; k < 3; ++k)
+      if (!used[std::size_t(k)]) a.col(k).setZero();
+    x = a.completeOrthogonalDecomposition().solve(Eigen::VectorXd::Ones(a.rows()));
+    Eigen::Index worst;
+    if (x.minCoeff(&worst) >= 0) break;
+    used[std::size_t(worst)] = false;
+  } while (true);
+  return {x[0], x[1], x[2]};
+}
+
+}  // namespace
+
+CostModel calibrate(const Database& db) {
+  std::vector<Cost> costs;
+  const double start = now();
+  for (double error = largest_error(db); costs.size() < 4 || now() - start < kCalibration; error /= 2) {
+    if (costs.size() > std::size_t(kRungs)) break;
+    const UniformCut cut{.error = error};
+    Cost best = extract(db, cut).cost;  // the first reading; its time counts only if none is better
+    for (int again = 0; again < 2; ++again)
+      best.seconds = std::min(best.seconds, extract(db, cut).cost.seconds);
+    best.seconds = std::max(best.seconds, 1e-9);
+    costs.push_back(best);
+  }
+  return fit(costs);
+}
+
+Cost expect(const Database& db, const CutSurface& cut, const CostModel& model) {
+  const Database::Reading reading = db.reading();
+  const auto ignore = [](const LodEntry&) {};
+  std::size_t leaves = 0;
+  const VisitCost inner = db.tree().visit(
+      [&](const LodPage& page, bool inside) {
+        LodHits hits = cut.hits(page, inside);
+        if (page.level == 1) leaves += std::size_t(std::popcount(hits.met)), hits.met = 0;
+        return hits;
+      },
+      ignore);
+  // Every n-th leaf, the first one included.
+  const std::size_t stride = std::max<std::size_t>(1, (leaves + kSampledLeaves - 1) / kSampledLeaves);
+  std::size_t leaf = 0, sampled = 0, found = 0, compared = 0;
+  db.tree().visit(
+      [&](const LodPage& page, bool inside) {
+        LodHits hits = cut.hits(page, inside);
+        if (page.level == 0) ++sampled, found += std::size_t(std::popcount(hits.met)), compared += page.count;
+        if (page.level != 1) return hits;
+        for (std::uint64_t left = hits.met; left; left &= left - 1)
+          if (leaf++ % stride) hits.met &= ~(left & -left);
+        return hits;
+      },
+      ignore);
+  const double scale = sampled > 0 && leaves > 0 ? double(leaves) / double(sampled) : 1;
+  Cost cost;
+  cost.nodes = inner.nodes + leaves;
+  cost.boxes = inner.boxes + std::size_t(std::llround(scale * double(leaves > 0 ? compared : 0)));
+  cost.patches = std::size_t(std::llround(scale * double(found)));
+  cost.bytes = cost.patches * sizeof(PatchSurface::codes);
+  cost.seconds = model.seconds(double(cost.nodes), double(cost.patches));
+  return cost;
+}
+
+Budgeted extract_in_time(const Database& db, const CostModel& model, double seconds, double most,
+                         const std::function<std::unique_ptr<CutSurface>(double error)>& cut_at) {
+  const auto fits = [&](double error) {
+    return expect(db, *cut_at(error), model).seconds <= kUsed * seconds;
+  };
+  double error = most, finer = most / kRung;
+  int rung = 0;
+  for (; rung < kRungs && fits(finer); ++rung) error = finer, finer /= kRung;
+  if (rung == kRungs && fits(0)) error = 0;
+  Budgeted best{error, extract(db, *cut_at(error))};
+  if (best.extraction.cost.seconds > seconds) best.extraction = extract(db, *cut_at(error));
+  return best;
+}
+
+}  // namespace patchwork

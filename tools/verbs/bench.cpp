@@ -10,9 +10,9 @@ namespace patchwork::cli {
 namespace {
 
 const std::map<std::string, std::vector<Work> (*)(const BenchOptions&)> kBenches{
-    {"codec", &bench_codec},  {"flight", &bench_flight},   {"import", &bench_import},
-    {"query", &bench_query},  {"readers", &bench_readers}, {"resample", &bench_resample},
-    {"update", &bench_update}};
+    {"blend", &bench_blend},       {"codec", &bench_codec},  {"flight", &bench_flight},
+    {"import", &bench_import},     {"query", &bench_query},  {"readers", &bench_readers},
+    {"resample", &bench_resample}, {"update", &bench_update}};
 
 struct Options {
   std::string name;

@@ -1,0 +1,230 @@
+// The blend's evaluators beside each other: the graphics card, the CPU, gdalwarp and the paper's way.
+#include <fmt/format.h>
+#include <gdal_utils.h>
+#include <oneapi/tbb/global_control.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "blend/vulkan/vulkan_blend.h"
+#include "db/error.h"
+#include "tools/bench/bench.h"
+#include "tools/bench/process.h"
+#include "tools/resampler.h"
+
+namespace patchwork::cli {
+
+namespace {
+
+constexpr double kStep = 10;           // metres, of the base; the surveys have half and a quarter of it
+constexpr std::size_t kPatches = 250;  // of the uniform cut
+constexpr int kSizes[] = {256, 512, 1024, 2048};
+constexpr int kPaperSize = 1024;               // larger ones would take the paper's way minutes
+constexpr double kTolerances[] = {1, 10, 50};  // pixels, of the view
+
+struct Closed {
+  void operator()(GDALDatasetH d) const { GDALClose(d); }
+};
+using Dataset = std::unique_ptr<void, Closed>;
+
+// Seconds of each run but the first.
+template <class Run>
+std::vector<double> seconds_of(int runs, Run run) {
+  std::vector<double> all;
+  for (int r = 0; r <= runs; ++r) {
+    const auto start = std::chrono::steady_clock::now();
+    run();
+    if (r > 0) all.push_back(seconds_since(start));
+  }
+  return all;
+}
+
+// One cut over one raster with one interpolant.
+struct Case {
+  std::string name;  // e.g. "1024 x 1024, bilinear"
+  int size = 0, smoothness = 0;
+  const Extraction* cut = nullptr;
+  bool peers = true;  // gdalwarp and the paper's way too
+};
+
+class BlendBench {
+ public:
+  explicit BlendBench(const BenchOptions& o)
+      : o_(o), folder_(o), side_((o.size - 1) * kStep), device_(Device::open()) {
+    GDALAllRegister();
+    make_sources();
+    db_ = std::make_unique<Database>(Database::open(folder_.path("blend.pwk")));
+    uniform_ = extract_within(*db_, {.patches = kPatches}, 1e4, [](double error) {
+                 return make_surface(UniformCut{.error = error});
+               }).extraction;
+    for (const double tolerance : kTolerances) views_.push_back(extract(*db_, view(tolerance)));
+    prefetch(*db_, uniform_.patches, kDefaultMemory);
+  }
+
+  std::vector<Work> run() {
+    std::vector<Work> works;
+    for (const int size : kSizes)
+      for (const int k : {0, 2})
+        measure({fmt::format("{0} x {0}, {1}", size, k ? "spline" : "bilinear"), size, k, &uniform_}, works);
+    for (std::size_t v = 0; v < views_.size(); ++v)
+      measure(
+          {fmt::format("1024 x 1024, bilinear, view at {} px", kTolerances[v]), 1024, 0, &views_[v], false},
+          works);
+    return works;
+  }
+
+ private:
+  void make_sources() {
+    const auto survey = [&](double x, double y, double part, double step, double angle) {
+      const double n = std::max(2.0, std::round(part * side_ / step));
+      return fmt::format("{},{},{:.0f},{:.0f},{},{},0.15", x * side_, y * side_, n, n, step, angle);
+    };
+    const Json terrain = make_terrain(
+        folder_.path("terrain"),
+        {"--size", std::to_string(o_.size), "--step", fmt::format("{}", kStep), "--noise", "0.15", "--survey",
+         survey(0.3, 0.3, 0.3, kStep / 2, 17), "--survey", survey(0.7, 0.6, 0.2, kStep / 4, -31)});
+    std::filesystem::remove(folder_.path("blend.pwk"));
+    for (const auto& f : terrain["files"]) {
+      const std::string path = folder_.path("terrain/" + std::string(f["file"]));
+      run_process({own_program("patchwork"), "import", folder_.path("blend.pwk"), path, "--accuracy",
+                   fmt::format("{}", double(f["accuracy"])), "--quiet"});
+      sources_.emplace_back(GDALOpen(path.c_str(), GA_ReadOnly));
+      if (!sources_.back()) throw Error(path, "GDAL cannot open it");
+    }
+  }
+
+  ViewCut view(double tolerance) const {
+    ViewCut v{.eye = {0.1 * side_, 0.1 * side_, 0},
+              .look = {0.6 * side_, 0.6 * side_, 0},
+              .pixel_error = tolerance};
+    for (const Grid& g : db_->grids()) v.look.z = std::max(v.look.z, g.info.highest);
+    v.eye.z = v.look.z + 0.05 * side_;
+    return over_terrain_of(*db_, v);
+  }
+
+  RasterFrame frame(int size) const {
+    const double step = side_ / size;
+    return {0.5 * step, step, 0, side_ - 0.5 * step, 0, -step};
+  }
+
+  std::vector<double> time(const Evaluator& evaluator, const Case& c, int runs, int threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+    heights_.resize(std::size_t(c.size) * std::size_t(c.size));
+    const BlendOutput out{.height = {}, .bound = {}, .source = {}, .patch = {}, .height32 = heights_};
+    return seconds_of(runs, [&] { counts_ = evaluator.at_pixels(frame(c.size), c.size, 0, c.size, out); });
+  }
+
+  // In this process and to memory, so that neither start nor writing counts.
+  std::vector<double> gdalwarp(const Case& c) {
+    const std::string size = std::to_string(c.size), side = fmt::format("{}", side_),
+                      threads = fmt::format("NUM_THREADS={}", o_.threads);
+    const char* words[] = {"-of",
+                           "MEM",
+                           "-q",
+                           "-r",
+                           c.smoothness ? "cubicspline" : "bilinear",
+                           "-te",
+                           "0",
+                           "0",
+                           side.c_str(),
+                           side.c_str(),
+                           "-ts",
+                           size.c_str(),
+                           size.c_str(),
+                           "-ot",
+                           "Float32",
+                           "-multi",
+                           "-wo",
+                           threads.c_str(),
+                           nullptr};
+    GDALWarpAppOptions* options = GDALWarpAppOptionsNew(const_cast<char**>(words), nullptr);
+    std::vector<GDALDatasetH> in;
+    for (const Dataset& d : sources_) in.push_back(d.get());
+    const std::vector<double> seconds = seconds_of(o_.runs, [&] {
+      const Dataset out(GDALWarp("", nullptr, int(in.size()), in.data(), options, nullptr));
+      if (!out) throw Error("gdalwarp", "it failed");
+    });
+    GDALWarpAppOptionsFree(options);
+    return seconds;
+  }
+
+  Spread rate(const Case& c, const std::vector<double>& seconds) const {
+    std::vector<double> rates;
+    for (const double s : seconds) rates.push_back(1e-6 * c.size * c.size / s);
+    return Spread::of(rates);
+  }
+
+  Json shares(const VulkanBlend& card) const {
+    const BlockShares s = card.shares();
+    const double all = double(s.out + s.inside + s.partial);
+    return {{"out", double(s.out) / all},
+            {"inside", double(s.inside) / all},
+            {"partial", double(s.partial) / all}};
+  }
+
+  void measure(const Case& c, std::vector<Work>& works) {
+    const BlendOptions options{.smoothness = c.smoothness};
+    const VulkanBlend card(device_, *db_, c.cut->patches, options);
+    const Blend cpu(*db_, c.cut->patches, options);
+    const Spread on_card = rate(c, time(card, c, o_.runs, o_.threads));
+    const std::vector<float> of_card = heights_;
+    const Spread on_cpu = rate(c, time(cpu, c, o_.runs, o_.threads)),
+                 on_one = rate(c, time(cpu, c, o_.runs, 1));
+    double off = 0;
+    for (std::size_t k = 0; k < heights_.size(); ++k)
+      if (heights_[k] == heights_[k]) off = std::max(off, std::abs(double(heights_[k]) - double(of_card[k])));
+    const VulkanBlend::Times t = card.times();
+    const double n = o_.runs + 1;
+    Json answer{{"device", device_->name()},
+                {"patches", c.cut->patches.size()},
+                {"largest_difference", off},
+                {"contributors_mean", double(counts_.contributions) / double(counts_.points)},
+                {"bound_max", counts_.bound_max},
+                {"blocks", shares(card)},
+                {"ms",
+                 {{"send", t.send / n},
+                  {"classify", t.classify / n},
+                  {"blend", t.blend / n},
+                  {"exact", t.exact / n},
+                  {"read_back", t.read_back / n}}}};
+    Work vulkan{"vulkan " + c.name,
+                "Msamples/s",
+                false,
+                on_card,
+                {{"cpu", on_cpu}, {"cpu 1 thread", on_one}},
+                answer};
+    Work plain{"cpu " + c.name, "Msamples/s", false, on_cpu, {{"cpu 1 thread", on_one}}, answer};
+    if (c.peers) {
+      const Spread warp = rate(c, gdalwarp(c));
+      vulkan.peers.emplace_back("gdalwarp", warp), plain.peers.emplace_back("gdalwarp", warp);
+    }
+    if (c.peers && c.size <= kPaperSize) vulkan.peers.emplace_back("paper", paper(c));
+    works.push_back(std::move(vulkan)), works.push_back(std::move(plain));
+  }
+
+  // Every sample walks through all patches, weighted, on the same device.
+  Spread paper(const Case& c) {
+    const VulkanBlend card(device_, *db_, c.cut->patches,
+                           {.smoothness = c.smoothness, .composition = Composition::weighted},
+                           {.classify = false, .choose = false});
+    return rate(c, time(card, c, 1, o_.threads));
+  }
+
+  const BenchOptions& o_;
+  WorkFolder folder_;
+  double side_;  // metres
+  std::shared_ptr<Device> device_;
+  std::vector<Dataset> sources_;
+  std::unique_ptr<Database> db_;
+  Extraction uniform_;
+  std::vector<Extraction> views_;
+  std::vector<float> heights_;
+  BlendCounts counts_;
+};
+
+}  // namespace
+
+std::vector<Work> bench_blend(const BenchOptions& options) { return BlendBench(options).run(); }
+
+}  // namespace patchwork::cli

@@ -33,12 +33,12 @@ VkPipeline Passes::made(OwnedPipeline& pipeline, Planes planes, int mode) {
   const std::uint32_t constants[] = {
       std::uint32_t(smoothness_), priority_, planes.gradient, planes.bound, planes.source,
       std::uint32_t(mode)};
-  if (!pipeline)
-    pipeline = make_pipeline(bindings,
-                             &pipeline == &classify_ ? shaders::classify()
-                             : mode == later         ? shaders::exact()
-                                                     : shaders::blend(),
-                             constants);
+  if (pipeline) return pipeline.get();
+  const auto shader = &pipeline == &classify_       ? shaders::classify()
+                      : &pipeline == &block_errors_ ? shaders::block_errors()
+                      : mode == later               ? shaders::exact()
+                                                    : shaders::blend();
+  pipeline = make_pipeline(bindings, shader, constants);
   return pipeline.get();
 }
 
@@ -136,19 +136,25 @@ void Frame::record(const Work& work, VkCommandBuffer commands) {
   if (work.ragged) run(Passes::holes);
   next();
   run(Passes::later);
+  if (work.push.fine > 0) {
+    barrier(commands);
+    use(passes_.block_errors());
+    vkCmdDispatch(commands, tiles, 1, 1);
+  }
   next();
 }
 
 void Frame::submit(const Work& work) {
   const VkCommandBuffer commands = commands_.begin();
   grow(work);
-  result_words_ = work.result_words;
+  result_words_ = work.result_words - work.read_from;
   timer_.reset(commands);
   timer_.mark(commands);
   barrier(commands);
   stage(work, commands);
   record(work, commands);
-  const VkBufferCopy head{0, 0, sizeof(TallyHead)}, all{0, sizeof(TallyHead), work.result_words * 4};
+  const VkBufferCopy head{0, 0, sizeof(TallyHead)};
+  const VkBufferCopy all{work.read_from * 4, sizeof(TallyHead), result_words_ * 4};
   vkCmdCopyBuffer(commands, tally_.get(), readback_.get(), 1, &head);
   vkCmdCopyBuffer(commands, results_.get(), readback_.get(), 1, &all);
   timer_.mark(commands);

@@ -16,9 +16,9 @@ struct Push {
   double x0, xc, xr, y0, yc, yr, base;
   std::uint32_t side, blocks, bound_at, source_at, gradient_at;
   float strict_error;
-  std::uint32_t explicit_points, classify, tiles, exact_rim;
+  std::uint32_t explicit_points, classify, tiles, fine, errors_at, exact_rim;
 };
-static_assert(sizeof(Push) == 96);
+static_assert(sizeof(Push) == 104);
 
 /// common.glsl: Tally without the list behind it.
 struct TallyHead {
@@ -46,6 +46,7 @@ class Passes {
   Bindings bindings;
   bool priority() const { return priority_; }
   VkPipeline classify() { return made(classify_, {}, 0); }
+  VkPipeline block_errors() { return made(block_errors_, {}, 0); }
   /// Compiled when first asked for: it takes some 50 ms on lavapipe.
   VkPipeline evaluate(Mode mode, Planes planes) {
     return made(evaluate_[mode][planes.number()], planes, mode);
@@ -55,7 +56,7 @@ class Passes {
   VkPipeline made(OwnedPipeline& pipeline, Planes planes, int mode);
   int smoothness_;
   bool priority_;
-  OwnedPipeline classify_, evaluate_[4][8];
+  OwnedPipeline classify_, block_errors_, evaluate_[4][8];
 };
 
 /// What a submission is made of.
@@ -66,6 +67,7 @@ struct Work {
   Planes planes{};
   bool ragged = true;  ///< some patch is not PatchKind::kPlain
   std::size_t result_words = 0;
+  std::size_t read_from = 0;  ///< words before that stay on the card
 };
 
 class Frame {
@@ -77,7 +79,7 @@ class Frame {
   /// Waits for the submission. Throws Error: the device was lost.
   void finish();
   const TallyHead& tally() const;
-  std::span<const std::uint32_t> results() const;
+  std::span<const std::uint32_t> results() const;  ///< from Work::read_from on
   /// Milliseconds: send, classify, blend, exact, read back.
   std::vector<double> times() const { return timer_.intervals(); }
   const Buffer& results_on_card() const { return results_; }

@@ -11,6 +11,9 @@ constexpr std::uint32_t kClassify[] = {
 constexpr std::uint32_t kBlend[] = {
 #include "blend.spv.inc"
 };
+constexpr std::uint32_t kBlockErrors[] = {
+#include "block_errors.spv.inc"
+};
 constexpr std::uint32_t kExact[] = {
 #include "exact.spv.inc"
 };
@@ -20,5 +23,6 @@ constexpr std::uint32_t kExact[] = {
 std::span<const std::uint32_t> classify() { return kClassify; }
 std::span<const std::uint32_t> blend() { return kBlend; }
 std::span<const std::uint32_t> exact() { return kExact; }
+std::span<const std::uint32_t> block_errors() { return kBlockErrors; }
 
 }  // namespace patchwork::shaders

@@ -160,9 +160,8 @@ TileHeights VulkanBlend::Impl::heights_of(const vk::Frame& frame, int side, vk::
 }
 
 // Two frames: while one runs on the device, the results of the other are taken and the next is prepared.
-BlendCounts VulkanBlend::Impl::run_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side,
-                                         vk::Planes planes,
-                                         const std::function<void(const TileHeights&)>& take) {
+BlendCounts VulkanBlend::Impl::run(const RasterFrame& lattice, std::span<const Tile> tiles, int side,
+                                   const Make& make, const Take& take) {
   BlendCounts counts;
   Pending before;
   const auto collect = [&](const Pending& p) {
@@ -170,9 +169,7 @@ BlendCounts VulkanBlend::Impl::run_tiles(const RasterFrame& lattice, std::span<c
     p.frame->finish();
     note(*p.frame);
     add(counts, p.frame->tally(), p.points);
-    TileHeights heights = heights_of(*p.frame, side, planes);
-    heights.first = p.first, heights.count = p.count;
-    take(heights);
+    take(*p.frame, p.first, p.count);
   };
   const std::size_t a_tile = std::size_t(side) * std::size_t(side);
   const std::uint32_t blocks = (std::uint32_t(side) + kBlock - 1) / kBlock;
@@ -188,12 +185,24 @@ BlendCounts VulkanBlend::Impl::run_tiles(const RasterFrame& lattice, std::span<c
     if (n == 1) hold_chosen(chosen, false);
     const TileBins bins = bin_tiles(placed, slots, lattice, some, chosen, blocks * blocks, base);
     const Pending now{frames[turn ^= 1].get(), first, n, wanted_points(some)};
-    now.frame->submit(tile_work(lattice, bins, side, planes));
+    now.frame->submit(make(bins));
     collect(before);
     before = now, first += n;
   }
   collect(before);
   return counts;
+}
+
+BlendCounts VulkanBlend::Impl::run_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side,
+                                         vk::Planes planes,
+                                         const std::function<void(const TileHeights&)>& take) {
+  return run(
+      lattice, tiles, side, [&](const TileBins& bins) { return tile_work(lattice, bins, side, planes); },
+      [&](const vk::Frame& frame, std::size_t first, std::size_t count) {
+        TileHeights heights = heights_of(frame, side, planes);
+        heights.first = first, heights.count = count;
+        take(heights);
+      });
 }
 
 VulkanBlend::VulkanBlend(std::shared_ptr<Device> device, const Database& db, std::span<const PatchId> patches,

@@ -46,6 +46,11 @@ struct VulkanBlend::Impl {
   }
   BlendCounts run_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side, vk::Planes planes,
                         const std::function<void(const TileHeights&)>& take);
+  /// The same for any work on tiles: `make` completes what is submitted, `take` has the results.
+  using Make = std::function<vk::Work(const TileBins& bins)>;
+  using Take = std::function<void(const vk::Frame& frame, std::size_t first, std::size_t count)>;
+  BlendCounts run(const RasterFrame& lattice, std::span<const Tile> tiles, int side, const Make& make,
+                  const Take& take);
   TileHeights heights_of(const vk::Frame& frame, int side, vk::Planes planes);
 };
 

@@ -54,7 +54,7 @@ void load_rects(inout Patch p) {
   if (kPriority && kMode == kPlain) return;
   const vec4 numbers = texelFetch(records, r + 5);
   p.samples = rect_of(texelFetch(records, r + 3));
-  p.volume = numbers.x, p.rim = numbers.y, p.holes = int(numbers.z), p.steep = (uint(numbers.w) & 4u) != 0;
+  p.volume = numbers.x, p.rim = numbers.y, p.holes = int(numbers.z), p.steep = (uint(numbers.w) & kSteep) != 0;
 }
 
 Place along(vec4 whole, vec4 rest, vec2 d) {

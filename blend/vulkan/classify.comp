@@ -54,11 +54,11 @@ void main() {
       continue;
     written[to + 1 + kept++] = k;
     const uint kind = uint(texelFetch(records, record + 5).w);
-    plain = plain && (kind & 2u) != 0;
+    plain = plain && (kind & (kWithoutHoles | kSteep)) == kWithoutHoles;
     const bool holds = u.x > kernel.x + kRoom && u.y < kernel.z - kRoom && v.x > kernel.y + kRoom &&
                        v.y < kernel.w - kRoom;
-    if (push.classify != 0 && kPriority && (kind & 1u) != 0 && holds) {
-      copied = kept == 1 && (kind & 4u) == 0;
+    if (push.classify != 0 && kPriority && (kind & kSolid) != 0 && holds) {
+      copied = kept == 1 && (kind & kSteep) == 0;
       break;
     }
   }

@@ -29,6 +29,9 @@ layout(binding = 7) writeonly buffer Results { uint results[]; };
 layout(binding = 9) readonly buffer Points { double points[]; };  // x, y; metres
 
 const int kRecord = 7, kExactRecord = 32, kEntry = 5;
+// Bits of a record's kind: PatchKind of patch_pool_impl.h.
+const uint kSolid = 1u, kWithoutHoles = 2u, kSteep = 4u << uint(kSmoothness);
+
 // What is done with a block; each mode has a work list and a pipeline of its own, because lavapipe runs both sides
 // of every branch.
 const int kCopy = 0;   // one patch holds it in its kernel

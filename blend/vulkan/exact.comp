@@ -38,8 +38,8 @@ void compose(inout Sum s, uint entry, dvec2 at) {
   const Place u = Place(wu, 0), v = Place(wv, 0);
   Jet own = kPriority ? ramp_weight(rect_of(ramp), slope_of(kernel, ramp), u, v)
                       : wendland_weight(rect_of(domain), u, v);
-  double floor_ = own.at;
-  if (kPriority && ramp != domain) floor_ = ramp_weight(rect_of(domain), slope_of(kernel, domain), u, v).at;
+  Jet least = own;
+  if (kPriority && ramp != domain) least = ramp_weight(rect_of(domain), slope_of(kernel, domain), u, v);
   const int holes = int(texelFetch(records, slot * kRecord + 5).z);
   bool real_cell = true;
   if (holes >= 0) {
@@ -49,8 +49,8 @@ void compose(inout Sum s, uint entry, dvec2 at) {
     own = times(own, hole_factor(holes, u, v));
   }
   const Jet faded = own;
-  precise const double weight = own.at + (kWeightFloor * floor_ + kRimFloor);
-  own.at = weight;
+  precise const double weight = own.at + (kWeightFloor * least.at + kRimFloor);
+  own = Jet(weight, own.u + kWeightFloor * least.u, own.v + kWeightFloor * least.v);
   const Jet code = interpolate(slot, 0, u, v);
   const double quantum = exact[x + 24];
   precise const double h = quantum * (exact[x + 26] + code.at) + exact[x + 25];

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <unordered_set>
 
 #include "blend/vulkan/patch_pool_impl.h"
@@ -19,27 +20,31 @@ void put(T (&to)[4], const LatticeRect& r) {
   to[0] = T(r.i0), to[1] = T(r.j0), to[2] = T(r.i1), to[3] = T(r.j1);
 }
 
-// Metres: an interpolant of smoothness 2 rounds by some 3e-7 of the differences that it is made of.
-constexpr double kSteepDifference = 1000;
-
-bool is_steep(const PatchSurface& s, double quantum) {
-  constexpr std::size_t side = PatchSurface::kSide;
+// The largest difference between neighbouring samples that a point of the domain reads, metres.
+double steepest(const PatchSurface& s, const Blend::Placed& p) {
+  constexpr int side = PatchSurface::kSide;
+  const auto low = [](double at) { return std::max(0, int(at) - 1); };
+  const auto high = [](double at) { return std::min(side - 1, int(at) + 2); };
+  const auto code = [&](int i, int j) { return s.codes[std::size_t(j * side + i)]; };
+  const int i0 = low(p.domain.i0), i1 = high(p.domain.i1), j0 = low(p.domain.j0), j1 = high(p.domain.j1);
   float most = 0;
-  for (std::size_t k = 0; k < kSamples; ++k) {
-    if (k % side > 0) most = std::max(most, std::abs(s.codes[k] - s.codes[k - 1]));
-    if (k >= side) most = std::max(most, std::abs(s.codes[k] - s.codes[k - side]));
-  }
-  return double(most) * quantum > kSteepDifference;
+  for (int j = j0; j <= j1; ++j)
+    for (int i = i0; i <= i1; ++i) {
+      if (i > i0) most = std::max(most, std::abs(code(i, j) - code(i - 1, j)));
+      if (j > j0) most = std::max(most, std::abs(code(i, j) - code(i, j - 1)));
+    }
+  return double(most) * p.quantum;
 }
 
-PatchRecord32 record32(const Blend::Placed& p, const PatchPool::Resident& r, bool steep) {
+PatchRecord32 record32(const Blend::Placed& p, const PatchPool::Resident& r) {
   PatchRecord32 out{};
   put(out.kernel, p.kernel), put(out.ramp, p.ramp), put(out.domain, p.domain), put(out.samples, p.samples);
   out.slope[0] = float(1 / (p.kernel.i0 - p.ramp.i0)), out.slope[1] = float(1 / (p.kernel.j0 - p.ramp.j0));
   out.slope[2] = float(1 / (p.ramp.i1 - p.kernel.i1)), out.slope[3] = float(1 / (p.ramp.j1 - p.kernel.j1));
   out.volume = float(p.volume), out.rim = float(p.rim), out.holes = r.holes ? float(*r.holes) : -1;
-  out.kind = float((!p.ragged && p.kernel_is_sampled() ? kSolid : 0) | (is_plain(p) && !steep ? kPlain : 0) |
-                   (steep ? kSteep : 0));
+  int kind = (!p.ragged && p.kernel_is_sampled() ? kSolid : 0) | (is_plain(p) ? kPlain : 0);
+  for (int k = 0; k < 3; ++k) kind |= r.steepest > kTooSteep[k] ? kSteep << k : 0;
+  out.kind = float(kind);
   out.turn[0] = float(p.ua), out.turn[1] = float(p.ub), out.turn[2] = float(p.va), out.turn[3] = float(p.vb);
   return out;
 }
@@ -147,12 +152,12 @@ void PatchPool::add(PatchId id) {
     impl_->ring.write(to, VkDeviceSize{slot} * bytes.size(), bytes);
   };
   send(impl_->samples, r.slot, surface->codes);
-  r.steep = is_steep(*surface, placed.quantum);
+  r.steepest = steepest(*surface, placed);
   if (surface->holes) {
     r.holes = take_slot();
     send(impl_->samples, *r.holes, words_of(*surface->holes));
   }
-  const PatchRecord32 record[] = {record32(placed, r, r.steep)};
+  const PatchRecord32 record[] = {record32(placed, r)};
   const PatchRecord64 exact[] = {record64(placed, facts)};
   send(impl_->records, r.slot, record);
   send(impl_->exact, r.slot, exact);

@@ -24,7 +24,7 @@ class PatchPool {
   struct Resident {
     std::uint32_t slot = 0;
     std::optional<std::uint32_t> holes = {};  ///< slot
-    bool steep = false;                       ///< PatchKind::kSteep
+    double steepest = 0;                      ///< metres: the largest difference between neighbouring samples
     float origin = 0;                         ///< a code of its middle: the shader's codes are relative to it
     double height = 0;                        ///< of that code, metres
   };

@@ -19,8 +19,8 @@ static_assert(sizeof(PatchRecord32) == 7 * 16);
 
 enum PatchKind {
   kSolid = 1,  ///< in its kernel it answers alone: no holes, and its samples reach beyond it
-  kPlain = 2,  ///< no holes, samples everywhere, and not steep
-  kSteep = 4   ///< neighbouring samples differ by so much that float32 would not do between them
+  kPlain = 2,  ///< no holes, and samples everywhere
+  kSteep = 4   ///< shifted by the smoothness: too steep for it
 };
 
 /// The same in double, for exact.comp.
@@ -30,6 +30,11 @@ struct PatchRecord64 {
   double quantum, base, origin, volume, error[3], rim;
 };
 static_assert(sizeof(PatchRecord64) == 32 * 8);
+
+/// Metres, by smoothness: between neighbouring samples that differ by more an interpolant in float32 would
+/// round by more than half a millimetre (1.2e-7 of the difference at 0, 3e-7 above). Coarse levels of rough
+/// terrain come near.
+inline constexpr double kTooSteep[] = {4000, 1500, 1500};
 
 /// No holes, and samples everywhere.
 bool is_plain(const Blend::Placed& p);

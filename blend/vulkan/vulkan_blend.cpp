@@ -80,7 +80,7 @@ void VulkanBlend::Impl::hold(std::span<const PatchId> patches) {
 void VulkanBlend::Impl::remember(std::uint32_t k) {
   const PatchPool::Resident& r = pool->at(placed[k].id);
   slots[k] = {r.slot, r.origin, r.height};
-  ragged |= r.steep;
+  ragged |= r.steepest > kTooSteep[options.smoothness];
 }
 
 bool VulkanBlend::Impl::hold_chosen(std::span<const Candidates> chosen, bool may_fail) {

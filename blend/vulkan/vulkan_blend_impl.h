@@ -15,7 +15,7 @@ struct VulkanBlend::Impl {
   VulkanOptions more;
   std::vector<Blend::Placed> placed;
   std::vector<SlotOf> slots;  // of `placed`, of those that are resident
-  bool ragged = false;        // some patch is not PatchKind::kPlain
+  bool ragged = false;        // some patch is not plain, or too steep
   bool all_resident = true;   // else each submission makes its own patches so
   std::unique_ptr<PatchPool> pool;
   std::shared_ptr<vk::Passes> passes;

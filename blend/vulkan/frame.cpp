@@ -156,7 +156,7 @@ void Frame::submit(const Work& work) {
   const VkBufferCopy head{0, 0, sizeof(TallyHead)};
   const VkBufferCopy all{work.read_from * 4, sizeof(TallyHead), result_words_ * 4};
   vkCmdCopyBuffer(commands, tally_.get(), readback_.get(), 1, &head);
-  vkCmdCopyBuffer(commands, results_.get(), readback_.get(), 1, &all);
+  if (all.size > 0) vkCmdCopyBuffer(commands, results_.get(), readback_.get(), 1, &all);
   timer_.mark(commands);
   barrier(commands);
   commands_.submit();

@@ -82,6 +82,7 @@ class Frame {
   std::span<const std::uint32_t> results() const;  ///< from Work::read_from on
   /// Milliseconds: send, classify, blend, exact, read back.
   std::vector<double> times() const { return timer_.intervals(); }
+  /// Whole, until the next submission.
   const Buffer& results_on_card() const { return results_; }
 
  private:

@@ -89,7 +89,8 @@ class VulkanBlend : public Evaluator {
   Times times() const;
   std::uint64_t exact_points() const;  ///< points of tiles that were evaluated in double
 
-  struct Impl;  ///< vulkan_blend_impl.h
+  struct Impl;  ///< vulkan_blend_impl.h: results that stay on the card
+  Impl& impl() const { return *impl_; }
 
  private:
   std::unique_ptr<Impl> impl_;

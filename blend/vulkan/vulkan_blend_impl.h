@@ -46,7 +46,8 @@ struct VulkanBlend::Impl {
   }
   BlendCounts run_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side, vk::Planes planes,
                         const std::function<void(const TileHeights&)>& take);
-  /// The same for any work on tiles: `make` completes what is submitted, `take` has the results.
+  /// Any work on tiles: `make` says what is submitted, `take` has the results, or with Work::read_from at
+  /// their end finds them on the card.
   using Make = std::function<vk::Work(const TileBins& bins)>;
   using Take = std::function<void(const vk::Frame& frame, std::size_t first, std::size_t count)>;
   BlendCounts run(const RasterFrame& lattice, std::span<const Tile> tiles, int side, const Make& make,

@@ -11,8 +11,8 @@ namespace patchwork {
 
 namespace {
 
-constexpr std::size_t kGroup = 64;  // points of a work group: exact.comp
-constexpr std::size_t kBatchPoints = std::size_t{1} << 18;
+constexpr std::size_t kGroup = 64;                          // points of a work group: exact.comp
+constexpr std::size_t kBatchPoints = std::size_t{1} << 16;  // so that the engine of `sample` has some in turn
 
 // Rows of a tile go to their places in a raster.
 class RasterSink {
@@ -134,37 +134,67 @@ void scatter(const PointGroups::Group& g, std::span<const std::uint32_t> words, 
   }
 }
 
-// One submission; REQUIRES: at most kBatchPoints / kGroup groups.
-void run_points(VulkanBlend::Impl& impl, std::span<const PointGroups::Group> groups,
-                std::span<const double> x, std::span<const double> y, const BlendOutput& out,
-                BlendCounts& counts) {
-  std::vector<Candidates> chosen;
-  for (const auto& g : groups) chosen.push_back(g.patches);
-  if (!impl.hold_chosen(chosen, groups.size() > 1)) {
-    const std::size_t half = groups.size() / 2;
-    run_points(impl, groups.first(half), x, y, out, counts);
-    run_points(impl, groups.subspan(half), x, y, out, counts);
-    return;
-  }
-  const TileBins bins = bins_of(groups, impl.placed, impl.slots);
-  std::vector<double> points(2 * kGroup * groups.size());
-  std::uint64_t wanted = 0;
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    for (std::size_t k = 0; k < groups[g].points.size(); ++k, ++wanted) {
-      const std::uint32_t from = groups[g].points[k];
-      points[2 * (kGroup * g + k)] = x[from], points[2 * (kGroup * g + k) + 1] = y[from];
+// Submissions of groups: while one runs on the device, the results of the other are scattered.
+class PointRun {
+ public:
+  PointRun(VulkanBlend::Impl& impl, std::span<const double> x, std::span<const double> y,
+           const BlendOutput& out)
+      : impl_(impl), x_(x), y_(y), out_(out) {}
+
+  // REQUIRES: at most kBatchPoints / kGroup groups.
+  void submit(std::span<const PointGroups::Group> groups) {
+    std::vector<Candidates> chosen;
+    for (const auto& g : groups) chosen.push_back(g.patches);
+    if (!impl_.hold_chosen(chosen, groups.size() > 1)) {
+      submit(groups.first(groups.size() / 2)), submit(groups.subspan(groups.size() / 2));
+      return;
     }
-  vk::Work work{.bins = &bins, .points = points, .push = impl.push()};  // its planes are of its own kind
-  const std::uint32_t n = std::uint32_t(kGroup * groups.size());
-  work.push.explicit_points = 1, work.push.bound_at = 2 * n, work.push.source_at = 4 * n;
-  work.result_words = std::size_t{5} * n;
-  vk::Frame& frame = *impl.frames[0];
-  frame.submit(work);
-  frame.finish();
-  add(counts, frame.tally(), wanted);
-  for (std::size_t g = 0; g < groups.size(); ++g)
-    scatter(groups[g], frame.results(), g * kGroup, work.push, impl, out);
-}
+    const TileBins bins = bins_of(groups, impl_.placed, impl_.slots);
+    gather(groups);
+    const std::uint32_t n = std::uint32_t(kGroup * groups.size());
+    vk::Work work{.bins = &bins, .points = points_, .push = impl_.push()};  // its planes are of its own kind
+    work.push.explicit_points = 1, work.push.bound_at = 2 * n, work.push.source_at = 4 * n;
+    work.result_words = std::size_t{5} * n;
+    const Pending now{impl_.frames[turn_ ^= 1].get(), groups, work.push};
+    now.frame->submit(work);
+    collect();
+    pending_ = now;
+  }
+  void collect() {
+    if (!pending_.frame) return;
+    vk::Frame& frame = *pending_.frame;
+    frame.finish();
+    std::uint64_t points = 0;
+    for (std::size_t g = 0; g < pending_.groups.size(); ++g) {
+      scatter(pending_.groups[g], frame.results(), g * kGroup, pending_.push, impl_, out_);
+      points += pending_.groups[g].points.size();
+    }
+    add(counts, frame.tally(), points);
+    pending_ = {};
+  }
+  BlendCounts counts;
+
+ private:
+  struct Pending {
+    vk::Frame* frame = nullptr;
+    std::span<const PointGroups::Group> groups = {};
+    vk::Push push = {};
+  };
+  void gather(std::span<const PointGroups::Group> groups) {
+    points_.assign(2 * kGroup * groups.size(), 0);
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      for (std::size_t k = 0; k < groups[g].points.size(); ++k) {
+        const std::uint32_t from = groups[g].points[k];
+        points_[2 * (kGroup * g + k)] = x_[from], points_[2 * (kGroup * g + k) + 1] = y_[from];
+      }
+  }
+  VulkanBlend::Impl& impl_;
+  std::span<const double> x_, y_;
+  const BlendOutput& out_;
+  std::vector<double> points_;
+  Pending pending_;
+  std::size_t turn_ = 0;
+};
 
 std::vector<Tile> tiles_of(int width, int row, int rows, int side) {
   std::vector<Tile> tiles;
@@ -196,18 +226,18 @@ BlendCounts VulkanBlend::at_points(std::span<const double> x, std::span<const do
     return std::isfinite(x[k]) && std::isfinite(y[k]);
   });
   for (auto k = finite; k != points.end(); ++k) forget(out, *k);
-  BlendCounts counts;
-  counts.points = std::uint64_t(points.end() - finite);
-  if (finite == points.begin()) return counts;
+  if (finite == points.begin()) return {.points = x.size()};
   PointGroups grouped(impl_->placed, impl_->priority(), x, y);
   Candidates all(impl_->placed.size());
   std::iota(all.begin(), all.end(), 0u);
   grouped.halve({points.begin(), finite}, all);
   const std::span<const PointGroups::Group> groups = grouped.groups;
+  PointRun run(*impl_, x, y, out);
   for (std::size_t g = 0; g < groups.size(); g += kBatchPoints / kGroup)
-    run_points(*impl_, groups.subspan(g, std::min(kBatchPoints / kGroup, groups.size() - g)), x, y, out,
-               counts);
-  return counts;
+    run.submit(groups.subspan(g, std::min(kBatchPoints / kGroup, groups.size() - g)));
+  run.collect();
+  run.counts.points += std::uint64_t(points.end() - finite);
+  return run.counts;
 }
 
 }  // namespace patchwork

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "blend/vulkan/vulkan_blend_impl.h"
 #include "tests/blend/vulkan_scene.h"
 
 namespace patchwork {
@@ -178,6 +179,53 @@ TEST_F(VulkanTiles, ACutThatNoTileFitsIsAnError) {
   const VulkanBlend blend(test_device(), db(), x.patches, {},
                           {.memory = PatchPool::kSlotBytes * 4, .tile = 256});
   EXPECT_THROW(at_pixels(blend, turned_raster(db().extent(), 256, 12), 256), Error);
+}
+
+TEST_F(VulkanTiles, TheSameQuestionGetsTheSameBits) {
+  const RasterFrame lattice = turned_raster(db().extent(), 260, 8);
+  const std::vector<Tile> tiles = tiles_over(260, 65);
+  std::vector<Tile> backwards(tiles.rbegin(), tiles.rend());
+  for (const BlendOptions& options : all_blends()) {
+    const VulkanBlend blend(test_device(), db(), extract(db(), {.error = 1}).patches, options);
+    const Planes a = planes_of(blend, lattice, tiles, 65), b = planes_of(blend, lattice, tiles, 65);
+    EXPECT_TRUE(a == b) << name_of(options);
+    Planes c = planes_of(blend, lattice, backwards, 65);
+    EXPECT_FALSE(a == c) << "negative control: the answers come in the order of the tiles";
+    for (std::size_t t = 0; t < tiles.size() / 2; ++t)
+      std::swap_ranges(c.height.begin() + long(t * 65 * 65), c.height.begin() + long((t + 1) * 65 * 65),
+                       c.height.begin() + long((tiles.size() - 1 - t) * 65 * 65));
+    EXPECT_EQ(std::memcmp(a.height.data(), c.height.data(), a.height.size() * sizeof(float)), 0);
+  }
+}
+
+TEST_F(VulkanTiles, ResultsStayOnTheCardForWhoeverDrawsThem) {
+  const RasterFrame lattice = turned_raster(db().extent(), 130, 8);
+  const std::vector<Tile> tiles = tiles_over(130, 65);
+  const VulkanBlend blend(test_device(), db(), extract(db(), {.error = 1}).patches, {});
+  const Planes want = planes_of(blend, lattice, tiles, 65);
+  const Device::Impl& device = test_device()->impl();
+  std::vector<float> got;
+  blend.impl().run(
+      lattice, tiles, 65,
+      [&](const TileBins& bins) {
+        vk::Work work = blend.impl().tile_work(lattice, bins, 65, {});
+        work.read_from = work.result_words;
+        return work;
+      },
+      [&](const vk::Frame& frame, std::size_t, std::size_t count) {
+        EXPECT_TRUE(frame.results().empty());
+        const VkBufferCopy all{0, 0, count * 65 * 65 * 4};
+        const vk::Buffer back(device, all.size, 0, vk::Where::readback);
+        vk::Commands commands(device);
+        vkCmdCopyBuffer(commands.begin(), frame.results_on_card().get(), back.get(), 1, &all);
+        vk::barrier(commands.get());
+        commands.submit();
+        commands.wait();
+        const auto* heights = reinterpret_cast<const float*>(back.mapped());
+        got.insert(got.end(), heights, heights + count * 65 * 65);
+      });
+  ASSERT_EQ(got.size(), want.height.size());
+  EXPECT_EQ(std::memcmp(got.data(), want.height.data(), got.size() * sizeof(float)), 0);
 }
 
 // 10 000 cuts one after another: what is resident is what the cut has, and what is sent is what it adds.

@@ -15,7 +15,7 @@ struct BenchOptions {
   int runs = 5;      ///< measured; one more of each side comes before to warm up
   int threads = 2;   ///< given to both sides
   int seconds = 60;  ///< that readers are kept busy
-  std::string file;  ///< of heights for `codec`; empty: a made terrain
+  std::string file;  ///< of heights for `codec` and `blend`; empty: a made terrain
   std::string keep;  ///< folder to work in and to leave; empty: a temporary one
 };
 

@@ -50,11 +50,11 @@ struct Case {
 
 class BlendBench {
  public:
-  explicit BlendBench(const BenchOptions& o)
-      : o_(o), folder_(o), side_((o.size - 1) * kStep), device_(Device::open()) {
+  explicit BlendBench(const BenchOptions& o) : o_(o), folder_(o), device_(Device::open()) {
     GDALAllRegister();
     make_sources();
     db_ = std::make_unique<Database>(Database::open(folder_.path("blend.pwk")));
+    extent_ = db_->extent(), side_ = std::min(extent_.xmax - extent_.xmin, extent_.ymax - extent_.ymin);
     uniform_ = extract_within(*db_, {.patches = kPatches}, 1e4, [](double error) {
                  return make_surface(UniformCut{.error = error});
                }).extraction;
@@ -75,28 +75,33 @@ class BlendBench {
   }
 
  private:
+  // The file that the options name, or a made terrain with two rotated surveys in it.
   void make_sources() {
+    std::filesystem::remove(folder_.path("blend.pwk"));
+    if (!o_.file.empty()) return add_source(o_.file, 1);
+    const double side = (o_.size - 1) * kStep;
     const auto survey = [&](double x, double y, double part, double step, double angle) {
-      const double n = std::max(2.0, std::round(part * side_ / step));
-      return fmt::format("{},{},{:.0f},{:.0f},{},{},0.15", x * side_, y * side_, n, n, step, angle);
+      const double n = std::max(2.0, std::round(part * side / step));
+      return fmt::format("{},{},{:.0f},{:.0f},{},{},0.15", x * side, y * side, n, n, step, angle);
     };
     const Json terrain = make_terrain(
         folder_.path("terrain"),
         {"--size", std::to_string(o_.size), "--step", fmt::format("{}", kStep), "--noise", "0.15", "--survey",
          survey(0.3, 0.3, 0.3, kStep / 2, 17), "--survey", survey(0.7, 0.6, 0.2, kStep / 4, -31)});
-    std::filesystem::remove(folder_.path("blend.pwk"));
-    for (const auto& f : terrain["files"]) {
-      const std::string path = folder_.path("terrain/" + std::string(f["file"]));
-      run_process({own_program("patchwork"), "import", folder_.path("blend.pwk"), path, "--accuracy",
-                   fmt::format("{}", double(f["accuracy"])), "--quiet"});
-      sources_.emplace_back(GDALOpen(path.c_str(), GA_ReadOnly));
-      if (!sources_.back()) throw Error(path, "GDAL cannot open it");
-    }
+    for (const auto& f : terrain["files"])
+      add_source(folder_.path("terrain/" + std::string(f["file"])), double(f["accuracy"]));
+  }
+
+  void add_source(const std::string& path, double accuracy) {
+    run_process({own_program("patchwork"), "import", folder_.path("blend.pwk"), path, "--accuracy",
+                 fmt::format("{}", accuracy), "--quiet"});
+    sources_.emplace_back(GDALOpen(path.c_str(), GA_ReadOnly));
+    if (!sources_.back()) throw Error(path, "GDAL cannot open it");
   }
 
   ViewCut view(double tolerance) const {
-    ViewCut v{.eye = {0.1 * side_, 0.1 * side_, 0},
-              .look = {0.6 * side_, 0.6 * side_, 0},
+    ViewCut v{.eye = {extent_.xmin + 0.1 * side_, extent_.ymin + 0.1 * side_, 0},
+              .look = {extent_.xmin + 0.6 * side_, extent_.ymin + 0.6 * side_, 0},
               .pixel_error = tolerance};
     for (const Grid& g : db_->grids()) v.look.z = std::max(v.look.z, g.info.highest);
     v.eye.z = v.look.z + 0.05 * side_;
@@ -105,7 +110,7 @@ class BlendBench {
 
   RasterFrame frame(int size) const {
     const double step = side_ / size;
-    return {0.5 * step, step, 0, side_ - 0.5 * step, 0, -step};
+    return {extent_.xmin + 0.5 * step, step, 0, extent_.ymin + side_ - 0.5 * step, 0, -step};
   }
 
   std::vector<double> time(const Evaluator& evaluator, const Case& c, int runs, int threads) {
@@ -117,18 +122,20 @@ class BlendBench {
 
   // In this process and to memory, so that neither start nor writing counts.
   std::vector<double> gdalwarp(const Case& c) {
-    const std::string size = std::to_string(c.size), side = fmt::format("{}", side_),
-                      threads = fmt::format("NUM_THREADS={}", o_.threads);
+    const std::string size = std::to_string(c.size), threads = fmt::format("NUM_THREADS={}", o_.threads);
+    const double x = extent_.xmin, y = extent_.ymin;
+    const std::string te[] = {fmt::format("{}", x), fmt::format("{}", y), fmt::format("{}", x + side_),
+                              fmt::format("{}", y + side_)};
     const char* words[] = {"-of",
                            "MEM",
                            "-q",
                            "-r",
                            c.smoothness ? "cubicspline" : "bilinear",
                            "-te",
-                           "0",
-                           "0",
-                           side.c_str(),
-                           side.c_str(),
+                           te[0].c_str(),
+                           te[1].c_str(),
+                           te[2].c_str(),
+                           te[3].c_str(),
                            "-ts",
                            size.c_str(),
                            size.c_str(),
@@ -213,7 +220,8 @@ class BlendBench {
 
   const BenchOptions& o_;
   WorkFolder folder_;
-  double side_;  // metres
+  Extent extent_;
+  double side_ = 0;  // metres: of the square that is evaluated
   std::shared_ptr<Device> device_;
   std::vector<Dataset> sources_;
   std::unique_ptr<Database> db_;

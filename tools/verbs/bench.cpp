@@ -67,7 +67,8 @@ void add_bench(CLI::App& app, Common& common) {
   auto o = std::make_shared<Options>();
   CLI::App* v = verb(app, common, "bench", "the project's own benchmarks, with peers beside it");
   v->add_option("NAME", o->name, "what to measure")->required()->check(CLI::IsMember(names()));
-  v->add_option("--file", o->bench.file, "heights to code, integers (codec only)")->check(CLI::ExistingFile);
+  v->add_option("--file", o->bench.file, "heights to use: to code, integers (codec), or to evaluate (blend)")
+      ->check(CLI::ExistingFile);
   v->add_option("--seconds", o->bench.seconds, "how long readers are kept busy (readers only)")
       ->check(CLI::Range(1, 3600));
   v->add_option("--size", o->bench.size, "samples along each side")->check(CLI::Range(129, 16385));

@@ -57,12 +57,14 @@ void load_rects(inout Patch p) {
   p.volume = numbers.x, p.rim = numbers.y, p.holes = int(numbers.z), p.steep = (uint(numbers.w) & kSteep) != 0;
 }
 
+// `d`: columns and rows from the anchor. The whole part is exact, so `precise` only keeps the order of the sums.
 Place along(vec4 whole, vec4 rest, vec2 d) {
   precise const float w = whole.x + whole.y * d.x + whole.z * d.y;
   precise const float r = rest.x + rest.y * d.x + rest.z * d.y;
   return Place(w, r);
 }
 
+// Metres above the base.
 Jet height_of(Patch p, Place u, Place v) {
   const Jet code = interpolate(p.slot, p.origin, u, v);
   precise const float h = p.quantum * code.at + p.rest_v.w;
@@ -75,6 +77,7 @@ Point point_at(uint c, uint r, Tile tile) {
   return Point(nothing(), vec2(c, r), c < tile.across && r < tile.down, false, false);
 }
 
+// What the CPU's Batch does with a patch at a point; a patch that does not reach it changes nothing.
 void compose(inout Point q, Patch p) {
   if (!q.wanted || (kPriority && q.sum.rest == 0)) return;
   const vec2 d = q.at - vec2(p.whole_u.w, p.rest_u.w);
@@ -98,11 +101,13 @@ void compose(inout Point q, Patch p) {
   q.steep = q.steep || (kMode == kHoles && p.steep);
 }
 
+// Neighbours share these vertices and must give them the same bits.
 bool on_exact_rim(Point q, Tile tile) {
   return push.exact_rim != 0 && (q.at.x == 0 || q.at.y == 0 || int(q.at.x) == tile.across - 1 ||
                                  int(q.at.y) == tile.down - 1);
 }
 
+// Their order does not matter: each is evaluated by itself.
 void postpone(uint at) {
   const uint n = atomicAdd(tally.later_count, 1);
   tally.later[n] = at;
@@ -134,6 +139,7 @@ void write_sum(Point q, uint t, Tile tile, inout Counted n) {
   write(q, t, tile, finish(q.sum), q.sum.reads, q.steep || (q.uncertain && !(q.sum.plain >= kUncertain)), n);
 }
 
+// One atomic a subgroup and counter.
 void count(Counted n) {
   const uint all = subgroupAdd(n.reads), largest = subgroupMax(n.most);
   const uint worst = subgroupMax(floatBitsToUint(n.bound));

@@ -24,7 +24,8 @@ float height_at(uvec2 at, uint plane) {
 float off_triangles(float h, vec4 corner, vec2 t) {
   const float a = corner.x, b = corner.y, c = corner.z, d = corner.w;
   const float falling = t.x >= t.y ? a + t.x * (b - a) + t.y * (d - b) : a + t.y * (c - a) + t.x * (d - c);
-  const float rising = t.x + t.y <= 1 ? a + t.x * (b - a) + t.y * (c - a) : d + (1 - t.x) * (c - d) + (1 - t.y) * (b - d);
+  const float rising = t.x + t.y <= 1 ? a + t.x * (b - a) + t.y * (c - a)
+                                      : d + (1 - t.x) * (c - d) + (1 - t.y) * (b - d);
   return max(abs(h - falling), abs(h - rising));
 }
 
@@ -42,6 +43,10 @@ float cell_error(uvec2 from, uint size, uint plane) {
   return worst;
 }
 
+float second_difference(uvec2 at, uvec2 step, uint plane) {
+  return abs(height_at(at - step, plane) - 2 * height_at(at, plane) + height_at(at + step, plane));
+}
+
 // What the blend may do between the samples: half of the largest second differences, which is a kink's height over
 // its chord, and four times that of a curve.
 float between(uvec2 from, uint size, uint plane) {
@@ -49,8 +54,8 @@ float between(uvec2 from, uint size, uint plane) {
   for (uint r = 0; r <= size; ++r)
     for (uint c = 1; c < size; ++c) {
       const uvec2 i = from + uvec2(c, r), j = from + uvec2(r, c);
-      across = max(across, abs(height_at(i - uvec2(1, 0), plane) - 2 * height_at(i, plane) + height_at(i + uvec2(1, 0), plane)));
-      down = max(down, abs(height_at(j - uvec2(0, 1), plane) - 2 * height_at(j, plane) + height_at(j + uvec2(0, 1), plane)));
+      across = max(across, second_difference(i, uvec2(1, 0), plane));
+      down = max(down, second_difference(j, uvec2(0, 1), plane));
     }
   return 0.5 * (across + down);
 }
@@ -80,7 +85,8 @@ void main() {
     for (uint d = 1; d <= 3; ++d) {
       const uint size = push.fine << d;
       for (uint r = 0; r < block_samples; r += size)
-        for (uint c = 0; c < block_samples; c += size) worst = max(worst, cell_error(from + uvec2(c, r), size, tile * a_tile));
+        for (uint c = 0; c < block_samples; c += size)
+          worst = max(worst, cell_error(from + uvec2(c, r), size, tile * a_tile));
       results[push.errors_at + (tile * across * across + b) * 3 + d - 1] = floatBitsToUint(worst + extra);
     }
   }

@@ -28,6 +28,7 @@ std::uint32_t memory_type(const Device::Impl& device, std::uint32_t allowed, Whe
 
 }  // namespace
 
+// Every buffer can be copied from and to; what is mapped stays so.
 Buffer::Buffer(const Device::Impl& device, VkDeviceSize bytes, VkBufferUsageFlags usage, Where where)
     : bytes_(std::max<VkDeviceSize>(bytes, 64)) {
   VkBufferCreateInfo info{};
@@ -60,6 +61,7 @@ OwnedView texels(const Device::Impl& device, const Buffer& buffer, VkFormat form
   return OwnedView(device.get(), view);
 }
 
+// A pool of its own, so that threads never share one.
 Commands::Commands(const Device::Impl& device) : device_(device) {
   VkCommandPoolCreateInfo pool{};
   pool.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
@@ -99,7 +101,7 @@ void Commands::submit() {
 
 void Commands::wait() {
   if (!running_) return;
-  running_ = false;
+  running_ = false;  // also where waiting fails: a lost device ends nothing
   VkFence fence = fence_.get();
   device_.check(vkWaitForFences(device_.get(), 1, &fence, VK_TRUE, UINT64_MAX), "waiting for the device");
   device_.check(vkResetFences(device_.get(), 1, &fence), "waiting for the device");

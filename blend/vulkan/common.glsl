@@ -79,6 +79,7 @@ layout(push_constant) uniform Push {
 
 // A coordinate along one axis as whole + rest, so that differences to nearby numbers lose nothing.
 struct Place { real whole, rest; };
+// How far past a number, and how far short of it.
 real beyond(Place p, real rim) { return (p.whole - rim) + p.rest; }
 real before(Place p, real rim) { return (rim - p.whole) - p.rest; }
 int cell_at(Place p) { return clamp(int(p.whole + p.rest), 1, kSide - 3); }
@@ -101,6 +102,7 @@ vec2_ wendland(real s) {
   return vec2_(s * s * s * (4 - 3 * s), 12 * s * s * (1 - s));
 }
 
+// Of a function of u alone and one of v alone.
 Jet product(vec2_ s, real du, vec2_ t, real dv) { return Jet(s.x * t.x, s.y * du * t.x, t.y * dv * s.x); }
 
 struct Rect { real i0, j0, i1, j1; };
@@ -119,6 +121,7 @@ Jet ramp_weight(Rect ramp, vec4_ slope, Place u, Place v) {
                  j0 < j1 ? slope.y : -slope.w);
 }
 
+// Both axes' distances from the nearer rim, so that nothing cancels where the weight is small.
 Jet wendland_weight(Rect domain, Place u, Place v) {
   const real du = 2 / (domain.i1 - domain.i0), dv = 2 / (domain.j1 - domain.j0);
   const real i0 = beyond(u, domain.i0), i1 = before(u, domain.i1);
@@ -144,6 +147,7 @@ void cell_weights(real t, out vec3_ w, out vec3_ d) {
 
 real code_at(int at) { return real(texelFetch(samples, at).x); }
 
+// `at`: the near vertex of the cell; differences of codes are exact.
 Jet bilinear(int at, real origin, real s, real t) {
   const real a = code_at(at) - origin, b = code_at(at + 1) - origin;
   const real c = code_at(at + kSide) - origin, d = code_at(at + kSide + 1) - origin;
@@ -158,6 +162,7 @@ vec2_ row_of(int at, real origin, vec3_ w, vec3_ dw) {
   return vec2_((b - origin) + (w.x * d.x + w.y * d.y + w.z * d.z), dw.x * d.x + dw.y * d.y + dw.z * d.z);
 }
 
+// Along u first, then across the four rows.
 Jet bicubic(int at, real origin, real s, real t) {
   vec3_ w, dw, y, dy;
   cell_weights(s, w, dw);

@@ -16,8 +16,10 @@ namespace patchwork {
 namespace {
 
 constexpr const char* kValidation = "VK_LAYER_KHRONOS_validation";
+// Subgroup operations came with 1.1; nothing later is needed.
 constexpr std::uint32_t kVersion = VK_API_VERSION_1_1;
 
+// VK_FALSE: the call that was complained about goes on.
 VKAPI_ATTR VkBool32 VKAPI_CALL keep_message(VkDebugUtilsMessageSeverityFlagBitsEXT,
                                             VkDebugUtilsMessageTypeFlagsEXT,
                                             const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
@@ -27,6 +29,7 @@ VKAPI_ATTR VkBool32 VKAPI_CALL keep_message(VkDebugUtilsMessageSeverityFlagBitsE
   return VK_FALSE;
 }
 
+// Warnings too: what the layer calls bad for speed is mended or argued about, not ignored.
 VkDebugUtilsMessengerCreateInfoEXT messenger_info(Device::Impl& impl) {
   VkDebugUtilsMessengerCreateInfoEXT info{};
   info.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
@@ -79,6 +82,7 @@ void make_instance(Device::Impl& impl, bool validation) {
   impl.messenger = vk::Messenger(instance, messenger);
 }
 
+// The first family of queues that runs compute shaders and can say how long they took.
 std::optional<std::uint32_t> computing_family(VkPhysicalDevice device) {
   std::uint32_t n = 0;
   vkGetPhysicalDeviceQueueFamilyProperties(device, &n, nullptr);
@@ -140,6 +144,7 @@ std::string lowered(std::string s) {
   return s;
 }
 
+// A whole number is a place in the list, anything else a part of a name.
 bool is_chosen(const std::string& choice, std::size_t number, const std::string& name) {
   std::size_t wanted = 0;
   const auto [end, bad] = std::from_chars(choice.data(), choice.data() + choice.size(), wanted);
@@ -163,6 +168,7 @@ const Candidate& choose(const std::vector<Candidate>& all, const std::string& ch
                              : "PATCHWORK_DEVICE is a number or a part of a name");
 }
 
+// One queue does everything: copies and dispatches of one evaluator depend on each other anyway.
 void make_device(Device::Impl& impl) {
   const float priority = 1;
   VkDeviceQueueCreateInfo queue{};

@@ -15,6 +15,7 @@ layout(local_size_x = 64) in;
 // blend/weight.h: kWeightFloor = 2^-60, kRimFloor = 2^-900.
 const double kWeightFloor = 8.673617379884035e-19lf, kRimFloor = 1.1830521861667747e-271lf;
 
+// Rectangles of the record in double.
 vec4_ four(int at) { return vec4_(exact[at], exact[at + 1], exact[at + 2], exact[at + 3]); }
 
 // 1 / width of the ramps between a rectangle and the kernel inside it.
@@ -26,6 +27,7 @@ bool outside(vec4_ r, double u, double v, double room) {
   return u < r.x - room || u > r.z + room || v < r.y - room || v > r.w + room;
 }
 
+// Batch::add for one patch and one point, the same operations in the same order.
 void compose(inout Sum s, uint entry, dvec2 at) {
   if (kPriority && s.rest == 0) return;
   const int e = int(entry) * kEntry, slot = int(texelFetch(entries, e + 2).w);
@@ -61,12 +63,14 @@ void compose(inout Sum s, uint entry, dvec2 at) {
       dmat2(exact[x + 2], exact[x + 3], exact[x + 4], exact[x + 5]));
 }
 
+// Explicit points know no blocks: all patches of their group.
 Sum of_tile(Tile tile, dvec2 at) {
   Sum s = nothing();
   for (uint k = 0; k < tile.count; ++k) compose(s, tile.first + k, at);
   return s;
 }
 
+// The same list as in blend.comp.
 Sum of_block(Tile tile, uint block, dvec2 at) {
   Sum s = nothing();
   const uint from = tile.lists + block * (tile.count + 1), length = texelFetch(lists, int(from)).x;

@@ -50,6 +50,8 @@ Frame::Frame(const Device::Impl& device, Passes& passes, const PatchPool::Impl& 
       timer_(device, kMarks),
       sets_(passes.bindings.make_set(set_)) {}
 
+// Buffers only grow. A view goes before its buffer does, and the set is written anew when either is another
+// one; the frame's last submission has ended by then.
 void Frame::grow(const Work& work) {
   const TileBins& bins = *work.bins;
   const std::size_t entries = bins.entries.size() * sizeof(TileEntry);
@@ -86,6 +88,8 @@ void Frame::bind_all() {
   b.bind(set_, 11, work_), b.bind(set_, 12, modes_);
 }
 
+// One staging buffer for everything that the host prepared; the counters start at 0, their dispatches at 0 x
+// 1 x 1.
 void Frame::stage(const Work& work, VkCommandBuffer commands) {
   VkDeviceSize used = 0;
   const auto send = [&](const Buffer& to, auto items) {
@@ -110,6 +114,7 @@ void Frame::record(const Work& work, VkCommandBuffer commands) {
   const auto use = [&](VkPipeline pipeline) {
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline);
   };
+  // How many groups there are only the card knows.
   const auto run = [&](Passes::Mode mode) {
     use(passes_.evaluate(mode, work.planes));
     const bool later = mode == Passes::later;
@@ -144,6 +149,7 @@ void Frame::record(const Work& work, VkCommandBuffer commands) {
   next();
 }
 
+// send | classify | blend | exact | read back: a mark stands between any two.
 void Frame::submit(const Work& work) {
   const VkCommandBuffer commands = commands_.begin();
   grow(work);

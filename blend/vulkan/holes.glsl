@@ -24,6 +24,7 @@ vec3_ spline(real a, real b, real c, real d, real t) {
                (-s * s * a + t * (3 * t - 4) * b - s * (3 * s - 4) * c + t * t * d) / 2, a + b + c + d);
 }
 
+// The wide distances of the four vertices around a cell in row j.
 vec3_ spline_row(int slot, int i, int j, real s) {
   vec4_ d;
   for (int a = 0; a < 4; ++a) d[a] = real(word_at(slot, i - 1 + a, j) >> 16 & 255u);
@@ -48,4 +49,5 @@ Jet hole_factor(int slot, Place u, Place v) {
   return Jet(clamp(along.x / kHoleFeather, real(0), real(1)), across.x / kHoleFeather, along.y / kHoleFeather);
 }
 
+// The product rule.
 Jet times(Jet a, Jet b) { return Jet(a.at * b.at, a.u * b.at + a.at * b.u, a.v * b.at + a.at * b.v); }

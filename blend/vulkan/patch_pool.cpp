@@ -49,6 +49,7 @@ PatchRecord32 record32(const Blend::Placed& p, const PatchPool::Resident& r) {
   return out;
 }
 
+// The CPU's own numbers, so that exact.comp rounds as it does.
 PatchRecord64 record64(const Blend::Placed& p, const PatchRecord& facts) {
   PatchRecord64 out{};
   out.x0 = p.x0, out.y0 = p.y0, out.ua = p.ua, out.ub = p.ub, out.va = p.va, out.vb = p.vb;
@@ -68,6 +69,7 @@ std::vector<std::uint32_t> words_of(const PatchSurface::Holes& h) {
   return words;
 }
 
+// Samples are seen as codes and, in the slots of holes, as words: two views of one buffer.
 std::unique_ptr<PatchPool::Impl> make_impl(std::shared_ptr<Device> device, std::size_t slots) {
   const Device::Impl& d = device->impl();
   const auto buffer = [&](std::size_t bytes, VkBufferUsageFlags usage) {
@@ -114,6 +116,7 @@ void PatchPool::hold(std::span<const PatchId> patches) {
   impl_->ring.flush();
 }
 
+// Slots of what goes are free at once: uploads into them are queued behind whatever still reads them.
 void PatchPool::drop_others(std::span<const PatchId> patches) {
   std::vector<PatchId> kept(patches.begin(), patches.end());
   std::sort(kept.begin(), kept.end());

@@ -6,6 +6,7 @@ namespace patchwork::vk {
 
 namespace {
 
+// All bindings are seen by compute shaders alone, one descriptor each.
 OwnedSetLayout make_set_layout(const Device::Impl& device, std::span<const VkDescriptorType> types) {
   std::vector<VkDescriptorSetLayoutBinding> bindings;
   for (std::uint32_t b = 0; b < types.size(); ++b)
@@ -29,6 +30,7 @@ OwnedLayout make_layout(const Device::Impl& device, VkDescriptorSetLayout set, s
   return OwnedLayout(device.get(), layout);
 }
 
+// Room for one set with any mixture of the two types.
 OwnedSets make_pool(const Device::Impl& device, std::uint32_t bindings) {
   const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, bindings},
                                         {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, bindings}};
@@ -88,6 +90,8 @@ void Bindings::bind(VkDescriptorSet set, std::uint32_t binding, const OwnedView&
   vkUpdateDescriptorSets(device_.get(), 1, &write, 0, nullptr);
 }
 
+// The module is only needed until the pipeline is made. Booleans are specialized as 32-bit words like
+// numbers.
 OwnedPipeline make_pipeline(const Bindings& bindings, std::span<const std::uint32_t> shader,
                             std::span<const std::uint32_t> constants) {
   const Device::Impl& device = bindings.device();
@@ -126,6 +130,7 @@ void Timer::mark(VkCommandBuffer commands) {
   vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, queries_.get(), next_++);
 }
 
+// Ticks are of the device: its properties say how many nanoseconds one takes.
 std::vector<double> Timer::intervals() const {
   std::vector<std::uint64_t> ticks(next_);
   if (next_ < 2) return {};

@@ -12,10 +12,12 @@ constexpr double kMiddle = 0.5 * (PatchSurface::kSide - 1);
 constexpr double kWholePart = 1024;   // whole parts are multiples of 1 / this
 constexpr double kLargest = 1 << 13;  // beyond it a coordinate is outside every window, to any precision
 
+// Exactly as Blend places a pixel.
 Point vertex(const RasterFrame& f, double c, double r) {
   return {f.x0 + (f.xc * c + f.xr * r), f.y0 + (f.yc * c + f.yr * r)};
 }
 
+// What the whole part leaves is below 2^-11 where it matters, and rounds at 2^-36.
 void split(double value, float& whole, float& rest) {
   whole = float(std::abs(value) < kLargest ? std::nearbyint(value * kWholePart) / kWholePart : value);
   rest = float(value - double(whole));

@@ -89,6 +89,7 @@ class PointGroups {
   std::span<const double> x_, y_;
 };
 
+// No data; what is not asked for is not written.
 void forget(const BlendOutput& out, std::size_t k) {
   if (!out.height.empty()) out.height[k] = NAN;
   if (!out.height32.empty()) out.height32[k] = NAN;
@@ -96,6 +97,7 @@ void forget(const BlendOutput& out, std::size_t k) {
   if (!out.source.empty()) out.source[k] = 0;
 }
 
+// The shader packs the low word first.
 double double_at(std::span<const std::uint32_t> words, std::size_t at) {
   return std::bit_cast<double>(std::uint64_t{words[at]} | std::uint64_t{words[at + 1]} << 32);
 }
@@ -118,6 +120,7 @@ TileBins bins_of(std::span<const PointGroups::Group> groups, const std::vector<B
   return bins;
 }
 
+// Points of a group go back to where they stood in the question.
 void scatter(const PointGroups::Group& g, std::span<const std::uint32_t> words, std::size_t at,
              const vk::Push& push, const VulkanBlend::Impl& impl, const BlendOutput& out) {
   for (std::size_t k = 0; k < g.points.size(); ++k, ++at) {
@@ -196,6 +199,7 @@ class PointRun {
   std::size_t turn_ = 0;
 };
 
+// Rows of tiles from the top; those at the right and the bottom want less than a whole one.
 std::vector<Tile> tiles_of(int width, int row, int rows, int side) {
   std::vector<Tile> tiles;
   for (int r = row; r < row + rows; r += side)

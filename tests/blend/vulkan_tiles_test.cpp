@@ -25,7 +25,8 @@ struct Planes {
   std::vector<std::int32_t> source;
   bool operator==(const Planes& o) const {
     const auto same = [](const std::vector<float>& a, const std::vector<float>& b) {
-      return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+      return a.size() == b.size() &&
+             (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0);
     };
     return same(height, o.height) && same(bound, o.bound) && same(gradient, o.gradient) && source == o.source;
   }

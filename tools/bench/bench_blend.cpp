@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 
 #include "blend/vulkan/vulkan_blend.h"
 #include "db/error.h"
@@ -28,16 +29,24 @@ struct Closed {
 };
 using Dataset = std::unique_ptr<void, Closed>;
 
-// Seconds of each run but the first.
-template <class Run>
-std::vector<double> seconds_of(int runs, Run run) {
-  std::vector<double> all;
-  for (int r = 0; r <= runs; ++r) {
-    const auto start = std::chrono::steady_clock::now();
-    run();
-    if (r > 0) all.push_back(seconds_since(start));
-  }
-  return all;
+struct Contestant {
+  std::string name;
+  std::function<void()> run;
+  int runs;  // measured; one more comes before to warm up
+  std::vector<double> seconds = {};
+};
+
+// In turns, A B A B: what disturbs the machine disturbs all.
+void race(std::vector<Contestant>& all) {
+  int most = 0;
+  for (const Contestant& c : all) most = std::max(most, c.runs);
+  for (int r = 0; r <= most; ++r)
+    for (Contestant& c : all) {
+      if (r > c.runs) continue;
+      const auto start = std::chrono::steady_clock::now();
+      c.run();
+      if (r > 0) c.seconds.push_back(seconds_since(start));
+    }
 }
 
 // One cut over one raster with one interpolant.
@@ -113,15 +122,16 @@ class BlendBench {
     return {extent_.xmin + 0.5 * step, step, 0, extent_.ymin + side_ - 0.5 * step, 0, -step};
   }
 
-  std::vector<double> time(const Evaluator& evaluator, const Case& c, int runs, int threads) {
+  BlendCounts evaluate(const Evaluator& evaluator, const Case& c, int threads,
+                       std::vector<float>& heights) const {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
-    heights_.resize(std::size_t(c.size) * std::size_t(c.size));
-    const BlendOutput out{.height = {}, .bound = {}, .source = {}, .patch = {}, .height32 = heights_};
-    return seconds_of(runs, [&] { counts_ = evaluator.at_pixels(frame(c.size), c.size, 0, c.size, out); });
+    heights.resize(std::size_t(c.size) * std::size_t(c.size));
+    const BlendOutput out{.height = {}, .bound = {}, .source = {}, .patch = {}, .height32 = heights};
+    return evaluator.at_pixels(frame(c.size), c.size, 0, c.size, out);
   }
 
   // In this process and to memory, so that neither start nor writing counts.
-  std::vector<double> gdalwarp(const Case& c) {
+  void gdalwarp(const Case& c) const {
     const std::string size = std::to_string(c.size), threads = fmt::format("NUM_THREADS={}", o_.threads);
     const double x = extent_.xmin, y = extent_.ymin;
     const std::string te[] = {fmt::format("{}", x), fmt::format("{}", y), fmt::format("{}", x + side_),
@@ -148,12 +158,9 @@ class BlendBench {
     GDALWarpAppOptions* options = GDALWarpAppOptionsNew(const_cast<char**>(words), nullptr);
     std::vector<GDALDatasetH> in;
     for (const Dataset& d : sources_) in.push_back(d.get());
-    const std::vector<double> seconds = seconds_of(o_.runs, [&] {
-      const Dataset out(GDALWarp("", nullptr, int(in.size()), in.data(), options, nullptr));
-      if (!out) throw Error("gdalwarp", "it failed");
-    });
+    const Dataset out(GDALWarp("", nullptr, int(in.size()), in.data(), options, nullptr));
     GDALWarpAppOptionsFree(options);
-    return seconds;
+    if (!out) throw Error("gdalwarp", "it failed");
   }
 
   Spread rate(const Case& c, const std::vector<double>& seconds) const {
@@ -174,48 +181,48 @@ class BlendBench {
     const BlendOptions options{.smoothness = c.smoothness};
     const VulkanBlend card(device_, *db_, c.cut->patches, options);
     const Blend cpu(*db_, c.cut->patches, options);
-    const Spread on_card = rate(c, time(card, c, o_.runs, o_.threads));
-    const std::vector<float> of_card = heights_;
-    const Spread on_cpu = rate(c, time(cpu, c, o_.runs, o_.threads)),
-                 on_one = rate(c, time(cpu, c, o_.runs, 1));
-    double off = 0;
-    for (std::size_t k = 0; k < heights_.size(); ++k)
-      if (heights_[k] == heights_[k]) off = std::max(off, std::abs(double(heights_[k]) - double(of_card[k])));
-    const VulkanBlend::Times t = card.times();
-    const double n = o_.runs + 1;
-    Json answer{{"device", device_->name()},
-                {"patches", c.cut->patches.size()},
-                {"largest_difference", off},
-                {"contributors_mean", double(counts_.contributions) / double(counts_.points)},
-                {"bound_max", counts_.bound_max},
-                {"blocks", shares(card)},
-                {"ms",
-                 {{"send", t.send / n},
-                  {"classify", t.classify / n},
-                  {"blend", t.blend / n},
-                  {"exact", t.exact / n},
-                  {"read_back", t.read_back / n}}}};
-    Work vulkan{"vulkan " + c.name,
-                "Msamples/s",
-                false,
-                on_card,
-                {{"cpu", on_cpu}, {"cpu 1 thread", on_one}},
-                answer};
-    Work plain{"cpu " + c.name, "Msamples/s", false, on_cpu, {{"cpu 1 thread", on_one}}, answer};
-    if (c.peers) {
-      const Spread warp = rate(c, gdalwarp(c));
-      vulkan.peers.emplace_back("gdalwarp", warp), plain.peers.emplace_back("gdalwarp", warp);
+    // The paper's way: every sample walks through all patches, weighted, on the same device.
+    const VulkanBlend paper(device_, *db_, c.cut->patches,
+                            {.smoothness = c.smoothness, .composition = Composition::weighted},
+                            {.classify = false, .choose = false});
+    std::vector<float> of_card, of_cpu, of_paper;
+    BlendCounts counts;
+    std::vector<Contestant> all{{"vulkan", [&] { counts = evaluate(card, c, o_.threads, of_card); }, o_.runs},
+                                {"cpu", [&] { evaluate(cpu, c, o_.threads, of_cpu); }, o_.runs},
+                                {"cpu 1 thread", [&] { evaluate(cpu, c, 1, of_cpu); }, o_.runs}};
+    if (c.peers) all.push_back({"gdalwarp", [&] { gdalwarp(c); }, o_.runs});
+    if (c.peers && c.size <= kPaperSize)
+      all.push_back({"paper", [&] { evaluate(paper, c, o_.threads, of_paper); }, 1});
+    race(all);
+    const Json answer = answer_of(c, card, counts, of_card, of_cpu);
+    for (std::size_t ours = 0; ours < 2; ++ours) {
+      Work w{all[ours].name + " " + c.name, "Msamples/s", false, rate(c, all[ours].seconds), {}, answer};
+      for (std::size_t k = 0; k < all.size(); ++k)
+        if (k != ours) w.peers.emplace_back(all[k].name, rate(c, all[k].seconds));
+      works.push_back(std::move(w));
     }
-    if (c.peers && c.size <= kPaperSize) vulkan.peers.emplace_back("paper", paper(c));
-    works.push_back(std::move(vulkan)), works.push_back(std::move(plain));
   }
 
-  // Every sample walks through all patches, weighted, on the same device.
-  Spread paper(const Case& c) {
-    const VulkanBlend card(device_, *db_, c.cut->patches,
-                           {.smoothness = c.smoothness, .composition = Composition::weighted},
-                           {.classify = false, .choose = false});
-    return rate(c, time(card, c, 1, o_.threads));
+  Json answer_of(const Case& c, const VulkanBlend& card, const BlendCounts& counts,
+                 const std::vector<float>& of_card, const std::vector<float>& of_cpu) const {
+    double off = 0;
+    for (std::size_t k = 0; k < of_cpu.size(); ++k)
+      if (of_cpu[k] == of_cpu[k]) off = std::max(off, std::abs(double(of_cpu[k]) - double(of_card[k])));
+    const VulkanBlend::Times t = card.times();
+    const double n = o_.runs + 1;
+    return {{"device", device_->name()},
+            {"patches", c.cut->patches.size()},
+            {"largest_difference", off},
+            {"bound_max", counts.bound_max},
+            {"contributors_mean", double(counts.contributions) / double(counts.points)},
+            {"blocks", shares(card)},
+            {"exact_share", double(card.exact_points()) / n / double(counts.points)},
+            {"ms",
+             {{"send", t.send / n},
+              {"classify", t.classify / n},
+              {"blend", t.blend / n},
+              {"exact", t.exact / n},
+              {"read_back", t.read_back / n}}}};
   }
 
   const BenchOptions& o_;
@@ -227,8 +234,6 @@ class BlendBench {
   std::unique_ptr<Database> db_;
   Extraction uniform_;
   std::vector<Extraction> views_;
-  std::vector<float> heights_;
-  BlendCounts counts_;
 };
 
 }  // namespace

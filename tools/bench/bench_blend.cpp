@@ -104,6 +104,7 @@ class BlendBench {
   void add_source(const std::string& path, double accuracy) {
     run_process({own_program("patchwork"), "import", folder_.path("blend.pwk"), path, "--accuracy",
                  fmt::format("{}", accuracy), "--quiet"});
+    paths_.push_back(path);
     sources_.emplace_back(GDALOpen(path.c_str(), GA_ReadOnly));
     if (!sources_.back()) throw Error(path, "GDAL cannot open it");
   }
@@ -130,32 +131,45 @@ class BlendBench {
     return evaluator.at_pixels(frame(c.size), c.size, 0, c.size, out);
   }
 
-  // In this process and to memory, so that neither start nor writing counts.
+  // What both ways of warping are asked for.
+  std::vector<std::string> warp_options(const Case& c) const {
+    const std::string size = std::to_string(c.size);
+    const auto metres = [](double m) { return fmt::format("{}", m); };
+    return {"-q",
+            "-r",
+            c.smoothness ? "cubicspline" : "bilinear",
+            "-te",
+            metres(extent_.xmin),
+            metres(extent_.ymin),
+            metres(extent_.xmin + side_),
+            metres(extent_.ymin + side_),
+            "-ts",
+            size,
+            size,
+            "-ot",
+            "Float32",
+            "-multi",
+            "-wo",
+            fmt::format("NUM_THREADS={}", o_.threads)};
+  }
+
+  // The program: it starts, reads the files and writes one.
   void gdalwarp(const Case& c) const {
-    const std::string size = std::to_string(c.size), threads = fmt::format("NUM_THREADS={}", o_.threads);
-    const double x = extent_.xmin, y = extent_.ymin;
-    const std::string te[] = {fmt::format("{}", x), fmt::format("{}", y), fmt::format("{}", x + side_),
-                              fmt::format("{}", y + side_)};
-    const char* words[] = {"-of",
-                           "MEM",
-                           "-q",
-                           "-r",
-                           c.smoothness ? "cubicspline" : "bilinear",
-                           "-te",
-                           te[0].c_str(),
-                           te[1].c_str(),
-                           te[2].c_str(),
-                           te[3].c_str(),
-                           "-ts",
-                           size.c_str(),
-                           size.c_str(),
-                           "-ot",
-                           "Float32",
-                           "-multi",
-                           "-wo",
-                           threads.c_str(),
-                           nullptr};
-    GDALWarpAppOptions* options = GDALWarpAppOptionsNew(const_cast<char**>(words), nullptr);
+    std::vector<std::string> command = warp_options(c);
+    command.insert(command.begin(), {"gdalwarp", "-overwrite"});
+    command.insert(command.end(), paths_.begin(), paths_.end());
+    command.push_back(folder_.path("warped.tif"));
+    run_process(command, "gdal-bin");
+  }
+
+  // The same in this process and to memory, so that neither start nor files count.
+  void warp_in_memory(const Case& c) const {
+    std::vector<std::string> words = warp_options(c);
+    words.insert(words.begin(), {"-of", "MEM"});
+    std::vector<char*> arguments;
+    for (std::string& w : words) arguments.push_back(w.data());
+    arguments.push_back(nullptr);
+    GDALWarpAppOptions* options = GDALWarpAppOptionsNew(arguments.data(), nullptr);
     std::vector<GDALDatasetH> in;
     for (const Dataset& d : sources_) in.push_back(d.get());
     const Dataset out(GDALWarp("", nullptr, int(in.size()), in.data(), options, nullptr));
@@ -191,6 +205,7 @@ class BlendBench {
                                 {"cpu", [&] { evaluate(cpu, c, o_.threads, of_cpu); }, o_.runs},
                                 {"cpu 1 thread", [&] { evaluate(cpu, c, 1, of_cpu); }, o_.runs}};
     if (c.peers) all.push_back({"gdalwarp", [&] { gdalwarp(c); }, o_.runs});
+    if (c.peers) all.push_back({"gdalwarp in memory", [&] { warp_in_memory(c); }, o_.runs});
     if (c.peers && c.size <= kPaperSize)
       all.push_back({"paper", [&] { evaluate(paper, c, o_.threads, of_paper); }, 1});
     race(all);
@@ -230,6 +245,7 @@ class BlendBench {
   Extent extent_;
   double side_ = 0;  // metres: of the square that is evaluated
   std::shared_ptr<Device> device_;
+  std::vector<std::string> paths_;
   std::vector<Dataset> sources_;
   std::unique_ptr<Database> db_;
   Extraction uniform_;

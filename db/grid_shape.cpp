@@ -3,8 +3,16 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 
 namespace patchwork {
+
+namespace {
+
+// Level-0 cells along a cell of the level.
+double cell_side(int level) { return double(std::uint64_t{1} << level); }
+
+}  // namespace
 
 GridShape::GridShape(int width, int height, bool pixel_is_area)
     : width_(width), height_(height), pad_(pixel_is_area ? 0.5 : 0.0) {
@@ -15,7 +23,7 @@ GridShape::GridShape(int width, int height, bool pixel_is_area)
   const double fj = std::min<double>(kFeatherCells, (f.j1 - f.j0) / 4);
   core_ = {f.i0 + fi, f.j0 + fj, f.i1 - fi, f.j1 - fj};
   for (int level = 0;; ++level) {
-    const double side = std::ldexp(kKernelCells, level);
+    const double side = kKernelCells * cell_side(level);
     const Level l{int(std::ceil(core_.i1 / side)), int(std::ceil(core_.j1 / side)), blocks_};
     levels_.push_back(l);
     blocks_ += size_t(l.bi) * size_t(l.bj);
@@ -24,13 +32,13 @@ GridShape::GridShape(int width, int height, bool pixel_is_area)
 }
 
 LatticeRect GridShape::kernel(int level, int bx, int by) const {
-  const double side = std::ldexp(kKernelCells, level);
+  const double side = kKernelCells * cell_side(level);
   return {std::max(core_.i0, bx * side), std::max(core_.j0, by * side), std::min(core_.i1, (bx + 1) * side),
           std::min(core_.j1, (by + 1) * side)};
 }
 
 LatticeRect GridShape::domain(int level, int bx, int by) const {
-  const double side = std::ldexp(kKernelCells, level), rim = std::ldexp(kExtensionCells, level);
+  const double side = kKernelCells * cell_side(level), rim = kExtensionCells * cell_side(level);
   const LatticeRect f = footprint();
   // Behind the last block lies at most a feather, which no other patch would answer.
   const auto end = [&](int b, int blocks, double last) {

@@ -15,8 +15,6 @@ constexpr double kFinestShare = 1.0 / 4096;
 constexpr double kAreaDoubt = 1e-12;    // relative; closer areas are compared exactly
 constexpr double kGrowth = 1.0 / 1024;  // of a cell: by this a covering kernel is grown
 
-double area(const LatticeRect& r) { return (r.i1 - r.i0) * (r.j1 - r.j0); }
-
 // A cover and the bottom from which on it is one.
 struct Cover {
   double bottom;

@@ -17,6 +17,7 @@ constexpr int kBudgetSteps = 24;  // halvings of those 20 octaves: the error is 
 
 struct Found {
   double bottom;
+  double kernel;  // area in level-0 cells: orders patches of one grid exactly
   const Grid* grid;
   std::size_t index;
   PatchId id;
@@ -30,10 +31,12 @@ double bound_of(const Found& f) {
   return beyond ? f.bottom + f.grid->info.rim_error : f.bottom;
 }
 
-// By bottom; ties by the order, the greater first.
+// By bottom; ties by the order, the greater first. Ties are many, because a survey's finest patches tend to be
+// as good as the survey: within a grid they are told apart by two numbers.
 void sort_by_priority(std::vector<Found>& found) {
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
     if (a.bottom != b.bottom) return a.bottom < b.bottom;
+    if (a.grid == b.grid) return a.kernel != b.kernel ? a.kernel > b.kernel : a.index > b.index;
     CoverageCounts ignored;
     return less(*b.grid, b.index, *a.grid, a.index, ignored);
   });
@@ -47,8 +50,10 @@ Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
   std::vector<Found> found;
   double largest_asked = 0;
   const Database::Reading reading = db.reading();
+  const Grid* last = nullptr;  // neighbours in the tree are mostly of one grid
   const auto emit = [&](const LodEntry& e) {
-    const Grid& grid = db.grid(e.id.grid());
+    if (!last || last->info.id != e.id.grid()) last = &db.grid(e.id.grid());
+    const Grid& grid = *last;
     const GridShape::Block block{e.id.level(), e.id.bx(), e.id.by()};
     const std::size_t index = grid.info.shape.index(block.level, block.bx, block.by);
     const PatchRecord& p = grid.patches[index];
@@ -57,7 +62,8 @@ Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
         cut.over(grid.info.frame, grid.info.shape.domain(block.level, block.bx, block.by));
     if (asked.low >= p.top || (p.bottom > asked.high && (strict || !p.best()))) return;
     if (!cut.meets(grid, block)) return;
-    found.push_back({p.bottom, &grid, index, e.id});
+    const LatticeRect kernel = grid.info.shape.kernel(block.level, block.bx, block.by);
+    found.push_back({p.bottom, area(kernel), &grid, index, e.id});
     largest_asked = std::max(largest_asked, asked.high);
   };
   const VisitCost visited =

@@ -65,9 +65,11 @@ struct Side {
 // the rounding of squares, which stand for roots.
 constexpr double kHair = 1e-9;
 
-// Boxes that meet `bounds` and whose errors meet k times the squared distance from the eye.
-PATCHWORK_VECTORIZED void near_enough(const LodPage& page, Point eye, double k, Extent bounds,
+// Boxes that meet `bounds` and whose errors meet k times the squared distance from the eye, `height` above the
+// plane.
+PATCHWORK_VECTORIZED void near_enough(const LodPage& page, Point eye, double height, double k, Extent bounds,
                                       std::uint8_t* __restrict hit) {
+  const double h = height * height;
   for (std::uint32_t s = 0; s < LodPage::kSlots; ++s) {
     const double left = page.xmin[s] - eye.x, right = eye.x - page.xmax[s];
     const double below = page.ymin[s] - eye.y, above = eye.y - page.ymax[s];
@@ -76,8 +78,8 @@ PATCHWORK_VECTORIZED void near_enough(const LodPage& page, Point eye, double k, 
     const double fx = std::abs(left) > std::abs(right) ? left : right;
     const double fy = std::abs(below) > std::abs(above) ? below : above;
     const double bottom = page.bottom[s], top = page.top[s];
-    hit[s] = std::uint8_t((bottom * bottom * (1 - kHair) <= k * (fx * fx + fy * fy)) &
-                          (k * (dx * dx + dy * dy) * (1 - kHair) < top * top) &
+    hit[s] = std::uint8_t((bottom * bottom * (1 - kHair) <= k * (fx * fx + fy * fy + h)) &
+                          (k * (dx * dx + dy * dy + h) * (1 - kHair) < top * top) &
                           (page.xmin[s] <= bounds.xmax) & (bounds.xmin <= page.xmax[s]) &
                           (page.ymin[s] <= bounds.ymax) & (bounds.ymin <= page.ymax[s]));
   }
@@ -96,6 +98,7 @@ class ViewSurface : public CutSurface {
  public:
   explicit ViewSurface(const ViewCut& cut)
       : eye_{cut.eye.x, cut.eye.y},
+        above_(cut.in_space ? std::max({0.0, cut.eye.z - cut.highest, cut.lowest - cut.eye.z}) : 0),
         slope_(cut.pixel_error * 2 * std::tan(cut.fov_degrees * (M_PI / 360)) / cut.height),
         corners_(footprint(cut)) {
     for (std::size_t k = 0; corners_.size() >= 3 && k < corners_.size(); ++k) {
@@ -107,7 +110,7 @@ class ViewSurface : public CutSurface {
     }
   }
 
-  double at(Point p) const override { return slope_ * std::hypot(p.x - eye_.x, p.y - eye_.y); }
+  double at(Point p) const override { return slope_ * std::hypot(p.x - eye_.x, p.y - eye_.y, above_); }
 
   // The frame's axes are orthogonal, so the nearest point of a rectangle is found axis by axis.
   ToleranceRange over(const Frame& frame, const LatticeRect& r) const override {
@@ -115,8 +118,8 @@ class ViewSurface : public CutSurface {
     const double i = frame.step_i(), j = frame.step_j();
     const auto near = [](double v, double a, double b) { return std::max({a - v, v - b, 0.0}); };
     const auto far = [](double v, double a, double b) { return std::max(std::abs(a - v), std::abs(b - v)); };
-    return {slope_ * std::hypot(i * near(e.x, r.i0, r.i1), j * near(e.y, r.j0, r.j1)),
-            slope_ * std::hypot(i * far(e.x, r.i0, r.i1), j * far(e.y, r.j0, r.j1))};
+    return {slope_ * std::hypot(i * near(e.x, r.i0, r.i1), j * near(e.y, r.j0, r.j1), above_),
+            slope_ * std::hypot(i * far(e.x, r.i0, r.i1), j * far(e.y, r.j0, r.j1), above_)};
   }
 
   // Two convex sets are apart if a side of one of them parts them.
@@ -141,7 +144,7 @@ class ViewSurface : public CutSurface {
   LodHits hits(const LodPage& page, bool) const override {
     if (sides_.empty()) return {};
     std::uint8_t hit[LodPage::kSlots];
-    near_enough(page, eye_, slope_ * slope_, bounds_, hit);
+    near_enough(page, eye_, above_, slope_ * slope_, bounds_, hit);
     if (page.mask_of_used(hit) == 0) return {};
     for (const Side& side : sides_) keep_inside(page, side, hit);
     return {page.mask_of_used(hit)};
@@ -149,6 +152,7 @@ class ViewSurface : public CutSurface {
 
  private:
   Point eye_;
+  double above_;  // metres that the eye is above or below all terrain, where the cut is in space
   double slope_;  // metres of tolerance a metre of distance
   std::vector<Point> corners_;
   Extent bounds_{INFINITY, INFINITY, -INFINITY, -INFINITY};  // of the corners

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "db/database.h"
+#include "db/point3.h"
 #include "query/region.h"
 
 namespace patchwork {
@@ -36,10 +37,6 @@ struct UniformCut {
       false;  ///< only patches with bottom <= error; else, where that is not available, the best there is
 };
 
-struct Point3 {
-  double x = 0, y = 0, z = 0;
-};
-
 /// A view: e(x, y) = pixel_error * distance to the eye in the plane / gamma, gamma = height / (2 tan(fov /
 /// 2)); so that an error is seen under at most that many pixels (the plane's distance is never the larger
 /// one). The region is the part of the plane over which the view's pyramid meets heights [lowest, highest].
@@ -50,6 +47,9 @@ struct ViewCut {
   double pixel_error = 1;          ///< pixels
   double far = 0;                  ///< metres along the line of sight; REQUIRES: > 0
   double lowest = 0, highest = 0;  ///< of the terrain, metres
+  /// The distance in space instead, to the nearest height in [lowest, highest]: fewer patches for an eye high
+  /// above, and the error is still seen under at most `pixel_error`, because no terrain is nearer than that.
+  bool in_space = false;
   bool strict = false;
 };
 

@@ -31,8 +31,8 @@ double bound_of(const Found& f) {
   return beyond ? f.bottom + f.grid->info.rim_error : f.bottom;
 }
 
-// By bottom; ties by the order, the greater first. Ties are many, because a survey's finest patches tend to be
-// as good as the survey: within a grid they are told apart by two numbers.
+// By bottom; ties by the order, the greater first. Ties are many, because a survey's finest patches tend to
+// be as good as the survey: within a grid they are told apart by two numbers.
 void sort_by_priority(std::vector<Found>& found) {
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
     if (a.bottom != b.bottom) return a.bottom < b.bottom;

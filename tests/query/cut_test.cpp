@@ -37,6 +37,7 @@ class Random {
     v.fov_degrees = uniform(10, 100), v.pixel_error = std::exp2(uniform(-1, 4)),
     v.far = uniform(100, 4 * side);
     v.lowest = -60, v.highest = 250;
+    v.in_space = below(2) == 0;
     return v;
   }
   FieldCut field(double side) {
@@ -216,6 +217,29 @@ TEST_F(CutTest, RangesHoldEveryToleranceInside) {
     narrow += r.high < high * (1 + 1e-9);
   }
   EXPECT_GT(narrow, 500) << "and a view's is no wider than it must be: its largest is at a corner";
+}
+
+TEST_F(CutTest, AConeInSpaceAllowsMoreThanThePlaneAndNoMoreThanIsSeenUnderItsPixels) {
+  Random random(test_seed(14));
+  int more = 0, too_much = 0;
+  for (int n = 0; n < 2000; ++n) {
+    ViewCut v = random.view(2000);
+    v.in_space = false;
+    const auto plane = make_surface(v);
+    v.in_space = true;
+    const auto space = make_surface(v);
+    const Point3 p{random.uniform(-2000, 2000), random.uniform(-2000, 2000),
+                   random.uniform(v.lowest, v.highest)};
+    const double gamma = v.height / (2 * std::tan(v.fov_degrees * std::numbers::pi / 360));
+    const double away = std::hypot(p.x - v.eye.x, p.y - v.eye.y, p.z - v.eye.z);
+    EXPECT_LE(space->at({p.x, p.y}), v.pixel_error * away / gamma * (1 + 1e-12));
+    EXPECT_GE(space->at({p.x, p.y}), plane->at({p.x, p.y}));
+    more += space->at({p.x, p.y}) > plane->at({p.x, p.y}) * 1.1;
+    v.highest = v.lowest;  // heights that the terrain does not keep to
+    too_much += make_surface(v)->at({p.x, p.y}) > v.pixel_error * away / gamma;
+  }
+  EXPECT_GT(more, 500);
+  EXPECT_GT(too_much, 100) << "negative control";
 }
 
 TEST_F(CutTest, AFootprintHoldsEveryPointThatIsSeen) {

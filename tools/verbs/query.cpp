@@ -20,6 +20,7 @@ struct Options {
   double fov = 60, pixel_error = 1;
   std::size_t patches = 0, bytes = 0;  // budgets; 0: none
   double milliseconds = 0;
+  bool cone = false;
   std::string field;
   double outside = 0;
   bool explain = false;
@@ -40,6 +41,7 @@ ViewCut view_of(const Database& db, const Options& o) {
                               .width = int(o.size[0]),
                               .height = int(o.size[1]),
                               .pixel_error = o.pixel_error,
+                              .in_space = o.cone,
                               .strict = o.strict});
 }
 
@@ -192,6 +194,8 @@ void add_query(CLI::App& app, Common& common) {
   v->add_option("--fov", o->fov, "vertical field of view, degrees");
   v->add_option("--size", o->size, "of the view: width height, pixels")->expected(2);
   v->add_option("--pixel-error", o->pixel_error, "largest error that you accept on the screen, pixels");
+  v->add_flag("--cone", o->cone, "distances in space, not in the plane: fewer patches for an eye high above")
+      ->needs(eye);
   v->add_option("--patches", o->patches, "a budget: the smallest error that needs no more patches");
   v->add_option("--bytes", o->bytes, "a budget: the smallest error whose samples take no more memory");
   v->add_option("--milliseconds", o->milliseconds, "a budget: the smallest error that is found in this time")

@@ -65,8 +65,8 @@ struct Side {
 // the rounding of squares, which stand for roots.
 constexpr double kHair = 1e-9;
 
-// Boxes that meet `bounds` and whose errors meet k times the squared distance from the eye, `height` above the
-// plane.
+// Boxes that meet `bounds` and whose errors meet k times the squared distance from the eye, which is
+// `height` above the plane.
 PATCHWORK_VECTORIZED void near_enough(const LodPage& page, Point eye, double height, double k, Extent bounds,
                                       std::uint8_t* __restrict hit) {
   const double h = height * height;

@@ -14,12 +14,12 @@ constexpr double kHairline = 1.0 / 512;
 
 class BoundHolds : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() { scene_ = std::make_unique<Scene>(surveys()); }
+  static void SetUpTestSuite() { scene_ = std::make_unique<Land>(surveys()); }
   static void TearDownTestSuite() { scene_.reset(); }
   static const Database& db() { return scene_->db(); }
-  static std::unique_ptr<Scene> scene_;
+  static std::unique_ptr<Land> scene_;
 };
-std::unique_ptr<Scene> BoundHolds::scene_;
+std::unique_ptr<Land> BoundHolds::scene_;
 
 TEST_F(BoundHolds, AgainstTheTerrainThatWasSurveyed) {
   std::mt19937_64 random(test_seed(1));
@@ -131,7 +131,7 @@ TEST_F(BoundHolds, UnderViewsWhereverAKernelOffersIt) {
 TEST_F(BoundHolds, OfOneGridAgainstItsOwnBilinearSurface) {
   const GridFile file =
       survey({.width = 150, .height = 130, .geotransform = rotated(100, 1500, 25, 9, 7)}, 0.3);
-  const Scene one({file});
+  const Land one({file});
   const Grid& g = one.db().grids()[0];
   std::mt19937_64 random(test_seed(3));
   std::uniform_real_distribution<double> i(0, file.width - 1), j(0, file.height - 1);
@@ -170,7 +170,7 @@ TEST(BoundAtTheRim, OfAPixelIsAreaGridKeepsToTheErrorOfWhatLiesBelow) {
   // The base does not cover the rough grid's kernels, or it would hide them at its own error.
   GridFile base{.width = 80, .height = 80, .geotransform = {0, 10, 0, 800, 0, -10}, .accuracy = 1};
   base.at = [](int, int) { return 105.0; };
-  const Scene scene({base, rough});
+  const Land scene({base, rough});
   std::mt19937_64 random(test_seed(4));
   Points points = random_points({600, 200, 720, 202.5}, 500, random);
   for (const BlendOptions& options : all_blends()) {
@@ -189,7 +189,7 @@ TEST(StrictBlend, AnswersEverywhereWhereTheErrorIsExactlyWhatThereIs) {
     g.accuracy = 0.1, g.at = [](int, int) { return 50.0; };
     grids.push_back(g);
   }
-  const Scene scene(grids);
+  const Land scene(grids);
   const double e = scene.db().grids()[0].at(0, 0, 0).bottom;
   std::mt19937_64 random(test_seed(5));
   const Points points = random_points(scene.db().extent(), 20000, random);

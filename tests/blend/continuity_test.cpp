@@ -81,7 +81,7 @@ class ContinuityCk : public ::testing::TestWithParam<BlendOptions> {
       grids[k].at = [at = grids[k].at, k](int i, int j) {
         return k == 1 && is_hole(i, j) ? kHole : at(i, j) + 3.0 * double(k);
       };
-    scene_ = std::make_unique<Scene>(grids);
+    scene_ = std::make_unique<Land>(grids);
   }
   static void TearDownTestSuite() { scene_.reset(); }
   static const Database& db() { return scene_->db(); }
@@ -135,9 +135,9 @@ class ContinuityCk : public ::testing::TestWithParam<BlendOptions> {
     for (std::size_t n = 0; n < errors.size(); ++n) stay |= jumps_stay(errors[n], at[n], next, h / 4);
     EXPECT_TRUE(stay) << "negative control: derivative " << next << " jumps";
   }
-  static std::unique_ptr<Scene> scene_;
+  static std::unique_ptr<Land> scene_;
 };
-std::unique_ptr<Scene> ContinuityCk::scene_;
+std::unique_ptr<Land> ContinuityCk::scene_;
 
 TEST_P(ContinuityCk, AcrossKernelRimsDomainRimsAndLevels) {
   const std::vector<double> errors{0, 1.5, 3, 6, 15};
@@ -156,7 +156,7 @@ TEST_P(ContinuityCk, AcrossTheCellsAroundAHole) {
 TEST_P(ContinuityCk, AcrossLevelsAlongTheRimOfAllData) {
   GridFile file{.width = 160, .height = 120, .geotransform = {0, 8, 0, 960, 0, -8}, .accuracy = 0.1};
   file.at = [](int i, int j) { return 3 * std::sin(i * j / 900.0) + 8 * std::cos(i / 40.0); };
-  const Scene one({file});
+  const Land one({file});
   const Grid& g = one.db().grids()[0];
   const double error = g.at(1, 1, 1).bottom;
   std::vector<Crossing> crossings;

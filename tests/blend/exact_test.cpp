@@ -45,7 +45,7 @@ TEST(SourceExact, AVertexOfTheMostAccurateGridInsideItsKernelGivesTheStoredValue
   fine.at = [&](int i, int j) { return noise[size_t(j * 80 + i)]; };
   GridFile base = exact_frames()[0];
   base.accuracy = 5, base.at = [](int, int) { return 3.0; };
-  const Scene scene({base, fine});
+  const Land scene({base, fine});
   const Grid& g = scene.db().grids()[1];
   Points points;
   std::vector<double> stored;
@@ -65,7 +65,7 @@ TEST(PartitionOfUnity, ConstantTerrainIsReproducedToTheLastBit) {
   constexpr double height = 1234.5;
   std::vector<GridFile> grids = surveys();
   for (GridFile& g : grids) g.at = [](int, int) { return height; }, g.accuracy = 0.1;
-  const Scene scene(grids);
+  const Land scene(grids);
   std::mt19937_64 random(test_seed(2));
   const Points points = random_points(scene.db().extent(), 10000, random);
   const std::vector<PatchId> all = every_patch(scene.db());
@@ -98,7 +98,7 @@ TEST(PartitionOfUnity, ASharedPlaneIsReproduced) {
   const auto plane = [](double x, double y) { return 100 + 0.25 * x - 0.125 * y; };
   std::vector<GridFile> grids = exact_frames();
   for (GridFile& g : grids) g = of_terrain(g, plane), g.accuracy = 0.5;
-  const Scene scene(grids);
+  const Land scene(grids);
   std::mt19937_64 random(test_seed(3));
   const Points points = random_points(scene.db().extent(), 20000, random);
   const std::vector<PatchId> all = every_patch(scene.db());
@@ -120,7 +120,7 @@ TEST_P(RimWeights, PointsJustInsideTheRimOfAllDataAnswerWithWhatTheGridsSay) {
   GridFile east = west;
   east.geotransform[0] = 360;
   west.at = [](int, int) { return 10.0; }, east.at = [](int, int) { return 20.0; };
-  const Scene scene({west, east});
+  const Land scene({west, east});
   const Extent e = scene.db().extent();
   const double rim = area ? 0 : 5;
   ASSERT_NEAR(e.xmin, rim, 1e-6);
@@ -152,7 +152,7 @@ TEST_P(RimWeights, PointsJustInsideTheRimOfAllDataAnswerWithWhatTheGridsSay) {
 TEST_P(RimWeights, PointsJustOutsideHaveNoData) {
   GridFile one{
       .width = 40, .height = 40, .geotransform = {0, 10, 0, 400, 0, -10}, .pixel_is_area = GetParam()};
-  const Scene scene({one});
+  const Land scene({one});
   const double first = GetParam() ? 0 : 5, last = 400 - first;
   Points points;
   points.add(std::nextafter(last, 1e9), 200), points.add(200, std::nextafter(last, 1e9));
@@ -172,7 +172,7 @@ TEST(FarOrigin, TheSameGridsTenThousandKilometresAwayGiveTheSameHeights) {
     const std::vector<GridFile> near = surveys();
     std::vector<GridFile> far = near;
     for (GridFile& g : far) g.geotransform[0] += offset.x, g.geotransform[3] += offset.y;
-    const Scene here(near), there(far);
+    const Land here(near), there(far);
     Points a = random_points(here.db().extent(), 5000, random), b;
     for (std::size_t k = 0; k < a.size(); ++k) {
       a.x[k] = std::round(a.x[k] * 64) / 64, a.y[k] = std::round(a.y[k] * 64) / 64;
@@ -199,7 +199,7 @@ TEST(RatioOfScales, ACentimetreGridOnAKilometreGridIsImportedAndReadInBoundedTim
   globe.at = [](int i, int j) { return 1000.0 + 8 * ((3 * i + 5 * j) % 7); };
   GridFile drone{.width = 300, .height = 300, .geotransform = rotated(30210, 30570, 31, 0.01, 0.01)};
   drone.accuracy = 0.02, drone.at = [](int i, int j) { return 1020 + 0.125 * ((i / 8 + j / 8) % 2); };
-  const Scene scene({globe, drone});
+  const Land scene({globe, drone});
   const Frame& frame = scene.db().grids()[1].info.frame;
   Points inside, outside;
   std::vector<double> stored;
@@ -231,7 +231,7 @@ class SplineStencil : public ::testing::Test {
 };
 
 TEST_F(SplineStencil, NeighbouringPatchesOfALevelAgreeInTheirOverlap) {
-  const Scene scene({spikes()});
+  const Land scene({spikes()});
   const Grid& g = scene.db().grids()[0];
   std::size_t overlaps = 0;
   for (int level = 0; level < g.info.shape.levels(); ++level)
@@ -257,7 +257,7 @@ TEST_F(SplineStencil, NeighbouringPatchesOfALevelAgreeInTheirOverlap) {
 
 TEST_F(SplineStencil, SpikesStayWithinTheBoundAndFinite) {
   const GridFile file = spikes();
-  const Scene scene({file});
+  const Land scene({file});
   const Grid& g = scene.db().grids()[0];
   std::mt19937_64 random(test_seed(5));
   const Points points = random_points(scene.db().extent(), 20000, random);

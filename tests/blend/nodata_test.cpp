@@ -77,7 +77,7 @@ class NodataEdges : public ::testing::TestWithParam<Holes> {
 };
 
 TEST_P(NodataEdges, EveryValidCellAnswersAtEveryErrorUpToItsCorners) {
-  const Scene scene({file_});
+  const Land scene({file_});
   const Points points = cells(true, {0, 0.3, 0.5, 1});
   ASSERT_GT(points.size(), 0u);
   for (const double error : kErrors)
@@ -93,7 +93,7 @@ TEST_P(NodataEdges, EveryValidCellAnswersAtEveryErrorUpToItsCorners) {
 }
 
 TEST_P(NodataEdges, HolesAreExactAtLevelZeroAndToTheErrorAboveIt) {
-  const Scene scene({file_});
+  const Land scene({file_});
   const Points inside = cells(false, {0.01, 0.99});
   for (const double error : {0.0, 0.5, 5.0, 20.0, 50.0}) {
     const Answers a = evaluate(scene.db(), error, inside);
@@ -111,7 +111,7 @@ TEST_P(NodataEdges, HolesAreExactAtLevelZeroAndToTheErrorAboveIt) {
 TEST_P(NodataEdges, NoPinholeWhereAnotherGridHasData) {
   GridFile base{.width = 90, .height = 80, .geotransform = {700, 13, 0, 1700, 0, -13}, .accuracy = 3};
   base.at = [](int i, int j) { return 102 + (i + j) % 3; };
-  const Scene scene({base, file_});
+  const Land scene({base, file_});
   std::mt19937_64 random(test_seed(1));
   Points points = random_points({800, 904, 1720, 1600}, 4000, random);
   for (const auto& p : {cells(true, {0, 0.5}), cells(false, {0, 0.5})})
@@ -133,7 +133,7 @@ TEST_P(NodataEdges, NoPinholeWhereAnotherGridHasData) {
 TEST_P(NodataEdges, ARotatedGridAnswersInsideItsValidCells) {
   file_.geotransform = rotated(800, 1600, 29, kStep, kStep);
   frame_ = frame_of(file_);
-  const Scene scene({file_});
+  const Land scene({file_});
   const Points points = cells(true, {1e-9, 0.5, 1 - 1e-9});
   for (const double error : kErrors) {
     const Answers a = evaluate(scene.db(), error, points);
@@ -150,13 +150,13 @@ TEST(NodataValues, WhateverMeansNoDataTheHeightsAreTheSame) {
   Points points;
   for (int k = 0; k < 5000; ++k) points.add(810 + 0.17 * k, 1590 - 0.131 * k);
   for (const double nodata : {-9999.0, 1e30, -3.4e38, double(NAN)}) {
-    const Scene scene({with_holes(hole, nodata)});
+    const Land scene({with_holes(hole, nodata)});
     answers.push_back(evaluate(scene.db(), 1, points, {.smoothness = 2}));
   }
   for (const Answers& a : answers)
     EXPECT_EQ(std::memcmp(a.height.data(), answers[0].height.data(), 40000), 0);
   GridFile whole = with_holes([](int, int) { return false; }, -9999);
-  const Answers without = evaluate(Scene({whole}).db(), 1, points, {.smoothness = 2});
+  const Answers without = evaluate(Land({whole}).db(), 1, points, {.smoothness = 2});
   EXPECT_NE(std::memcmp(without.height.data(), answers[0].height.data(), 40000), 0)
       << "negative control: holes matter";
 }

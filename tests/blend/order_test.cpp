@@ -16,13 +16,13 @@ class SummationOrder : public ::testing::Test {
     grids[1].at = [whole = grids[1].at](int i, int j) {
       return i > 30 && i < 50 && j > 20 && j < 40 ? kHole : whole(i, j);
     };
-    scene_ = std::make_unique<Scene>(grids);
+    scene_ = std::make_unique<Land>(grids);
   }
   static void TearDownTestSuite() { scene_.reset(); }
   static const Database& db() { return scene_->db(); }
-  static std::unique_ptr<Scene> scene_;
+  static std::unique_ptr<Land> scene_;
 };
-std::unique_ptr<Scene> SummationOrder::scene_;
+std::unique_ptr<Land> SummationOrder::scene_;
 
 TEST_F(SummationOrder, SameBitsForAnyNumberOfThreads) {
   std::mt19937_64 random(test_seed(1));

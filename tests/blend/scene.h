@@ -116,9 +116,9 @@ inline std::string name_of(const BlendOptions& o) {
 }
 
 /// A folder with one database in it.
-class Scene {
+class Land {
  public:
-  explicit Scene(const std::vector<GridFile>& grids) : db_(folder_.database()) {
+  explicit Land(const std::vector<GridFile>& grids) : db_(folder_.database()) {
     for (const GridFile& g : grids) folder_.add(db_, g, "grid" + std::to_string(db_.grids().size()));
   }
   const Database& db() const { return db_; }

@@ -58,7 +58,7 @@ TEST(VulkanDevice, MoreMemoryThanThereIsIsAnError) {
     vk::Buffer(device->impl(), VkDeviceSize{1} << 50, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, vk::Where::card);
   });
   EXPECT_NE(said.find("memory"), std::string::npos) << said;
-  const Scene scene(surveys());
+  const Land scene(surveys());
   EXPECT_THROW(PatchPool(device, scene.db(), device->most_patches() + 1), Error);
 }
 

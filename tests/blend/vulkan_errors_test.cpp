@@ -61,7 +61,7 @@ struct Dense {
 
 class BlockErrors : public VulkanTest {
  protected:
-  static void SetUpTestSuite() { scene_ = std::make_unique<Scene>(surveys()); }
+  static void SetUpTestSuite() { scene_ = std::make_unique<Land>(surveys()); }
   static void TearDownTestSuite() { scene_.reset(); }
   static const Database& db() { return scene_->db(); }
   static std::vector<float> of(const VulkanBlend& blend, const RasterFrame& f, std::span<const Tile> tiles,
@@ -74,9 +74,9 @@ class BlockErrors : public VulkanTest {
     });
     return all;
   }
-  static std::unique_ptr<Scene> scene_;
+  static std::unique_ptr<Land> scene_;
 };
-std::unique_ptr<Scene> BlockErrors::scene_;
+std::unique_ptr<Land> BlockErrors::scene_;
 
 // A lattice of 6 m, turned, whose tiles lie inside all data.
 const RasterFrame kLattice{500, 5.9, 1.1, 600, 1.1, -5.9};

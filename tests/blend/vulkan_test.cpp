@@ -24,7 +24,7 @@ class CpuGpuParity : public VulkanTest {
     EXPECT_GT(all.answered, 0u) << what;
     return all;
   }
-  static void compare(const Scene& scene, std::initializer_list<double> errors, double degrees,
+  static void compare(const Land& scene, std::initializer_list<double> errors, double degrees,
                       const std::string& what) {
     for (const double error : errors)
       compare(scene.db(), extract(scene.db(), {.error = error}).patches,
@@ -33,12 +33,12 @@ class CpuGpuParity : public VulkanTest {
 };
 
 TEST_F(CpuGpuParity, RotatedMirroredAndOverlappingGridsUnderUniformCuts) {
-  const Scene scene(surveys());
+  const Land scene(surveys());
   compare(scene, {0.0, 1.0, 5.0, 100.0}, 11, "surveys");
 }
 
 TEST_F(CpuGpuParity, UnderViewCuts) {
-  const Scene scene(surveys());
+  const Land scene(surveys());
   std::mt19937_64 random(test_seed(1));
   const Extent e = scene.db().extent();
   std::uniform_real_distribution<double> x(e.xmin, e.xmax), y(e.ymin, e.ymax);
@@ -51,7 +51,7 @@ TEST_F(CpuGpuParity, UnderViewCuts) {
 }
 
 TEST_F(CpuGpuParity, TheBoundHoldsWithTheDifferenceAdded) {
-  const Scene scene(surveys());
+  const Land scene(surveys());
   const RasterFrame raster = turned_raster(scene.db().extent(), kSide, 3);
   for (const double error : {0.0, 5.0, 100.0})
     for (const BlendOptions& options : all_blends()) {
@@ -71,19 +71,19 @@ TEST_F(CpuGpuParity, FarOrigin) {
   for (const Point offset : {Point{500000, 5000000}, Point{1e7, -1e7}}) {
     std::vector<GridFile> far = surveys();
     for (GridFile& g : far) g.geotransform[0] += offset.x, g.geotransform[3] += offset.y;
-    compare(Scene(far), {0.0, 3.0}, 17, "far origin");
+    compare(Land(far), {0.0, 3.0}, 17, "far origin");
   }
   // 1e-5 degrees of longitude and latitude.
   GridFile degrees{.width = 120, .height = 100, .geotransform = {11.5, 1e-5, 0, 47.25, 0, -1e-5}};
   degrees.at = [](int i, int j) { return 800 + 3 * std::sin(i / 9.0) + 2 * std::cos(j / 5.0); };
-  compare(Scene({degrees}), {0.0}, 17, "degrees");
+  compare(Land({degrees}), {0.0}, 17, "degrees");
 }
 
 // What the shaders do not do: window coordinates from absolute positions in float32.
 TEST_F(CpuGpuParity, AbsoluteCoordinatesInFloatWouldBreakTheLimit) {
   std::vector<GridFile> far = surveys();
   for (GridFile& g : far) g.geotransform[0] += 500000, g.geotransform[3] += 5000000;
-  const Scene scene(far);
+  const Land scene(far);
   const Extraction x = extract(scene.db(), {.error = 0});
   std::mt19937_64 random(test_seed(2));
   Points exact = random_points(scene.db().extent(), 2000, random), rounded;
@@ -101,7 +101,7 @@ TEST_F(CpuGpuParity, RatioOfScales) {
   globe.at = [](int i, int j) { return 1000.0 + 8 * ((3 * i + 5 * j) % 7); };
   GridFile drone{.width = 300, .height = 300, .geotransform = rotated(30210, 30570, 31, 0.01, 0.01)};
   drone.accuracy = 0.02, drone.at = [](int i, int j) { return 1020 + 0.125 * ((i / 8 + j / 8) % 2); };
-  const Scene scene({globe, drone});
+  const Land scene({globe, drone});
   const Extraction x = extract(scene.db(), {.error = 0});
   // Rasters of 420 m and of 1 cm over both, and one whose pixels stride over the whole drone grid.
   compare(scene.db(), x.patches, turned_raster(scene.db().extent(), kSide, 5), "globe");
@@ -127,7 +127,7 @@ TEST_F(CpuGpuParity, NodataEdges) {
     };
     GridFile base{.width = 90, .height = 80, .geotransform = {700, 13, 0, 1700, 0, -13}, .accuracy = 3};
     base.at = [](int i, int j) { return 102 + (i + j) % 3; };
-    const Scene alone({ragged}), covered({base, ragged});
+    const Land alone({ragged}), covered({base, ragged});
     compare(alone, {0.0, 5.0, 1000.0}, 7, "holes");
     compare(covered, {0.0, 5.0}, 7, "holes over a base");
     // Pixels on the samples and on the middles of cells: every edge of every hole is hit exactly.
@@ -144,7 +144,7 @@ TEST_F(CpuGpuParity, RimWeights) {
     GridFile east = west;
     east.geotransform[0] = 360;
     west.at = [](int, int) { return 10.0; }, east.at = [](int, int) { return 20.0; };
-    const Scene scene({west, east});
+    const Land scene({west, east});
     const Extraction x = extract(scene.db(), {.error = 0});
     const double rim = area ? 0 : 5;
     for (const double inside : {0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-3, -1e-12, -1e-7, -1e-4})
@@ -158,7 +158,7 @@ TEST_F(CpuGpuParity, RimWeights) {
 TEST_F(CpuGpuParity, PartitionOfUnity) {
   std::vector<GridFile> grids = surveys();
   for (GridFile& g : grids) g.at = [](int, int) { return 1234.5; }, g.accuracy = 0.1;
-  const Scene constant(grids);
+  const Land constant(grids);
   const RasterFrame raster = turned_raster(constant.db().extent(), kSide, 30);
   const Extraction x = extract(constant.db(), {.error = 0.2});
   for (const BlendOptions& options : all_blends()) {
@@ -171,7 +171,7 @@ TEST_F(CpuGpuParity, PartitionOfUnity) {
   const auto plane = [](double px, double py) { return 100 + 0.25 * px - 0.125 * py; };
   grids = surveys();
   for (GridFile& g : grids) g = of_terrain(g, plane), g.accuracy = 0.5;
-  compare(Scene(grids), {0.0, 0.6}, 12, "plane");
+  compare(Land(grids), {0.0, 0.6}, 12, "plane");
 }
 
 TEST_F(CpuGpuParity, SplineStencil) {
@@ -179,26 +179,26 @@ TEST_F(CpuGpuParity, SplineStencil) {
   spikes.at = [](int i, int j) {
     return (i * 37 + j * 101) % 23 == 0 ? 5000.0 : double((i * 5 + j * 3) % 11);
   };
-  compare(Scene({spikes}), {0.0, 500.0}, 9, "spikes");
+  compare(Land({spikes}), {0.0, 500.0}, 9, "spikes");
   // As steep as float32 is trusted with, at smoothness 0 and above.
   for (const double height : {3990.0, 1490.0}) {
     spikes.at = [height](int i, int j) {
       return (i * 37 + j * 101) % 23 == 0 ? height : double((i * 5 + j * 3) % 11);
     };
-    compare(Scene({spikes}), {0.0, 500.0}, 9, "spikes of " + std::to_string(height));
+    compare(Land({spikes}), {0.0, 500.0}, 9, "spikes of " + std::to_string(height));
   }
   GridFile smallest{.width = 2, .height = 2, .geotransform = {0, 10, 0, 20, 0, -10}};
   smallest.at = [](int i, int j) { return 3.0 * i + 5 * j; };
-  compare(Scene({smallest}), {0.0}, 9, "two samples a side");
+  compare(Land({smallest}), {0.0}, 9, "two samples a side");
 }
 
 TEST_F(CpuGpuParity, DegenerateGrids) {
   GridFile sheet{.width = 200, .height = 3, .geotransform = {0, -7, 0, 100, 0, 0.5}};
   sheet.at = [](int i, int j) { return -50 + 0.1 * i + j; };
-  compare(Scene({sheet}), {0.0, 1.0}, 2, "mirrored sheet");
+  compare(Land({sheet}), {0.0, 1.0}, 2, "mirrored sheet");
   GridFile high{.width = 60, .height = 60, .geotransform = {0, 90, 0, 5400, 0, -90}};
   high.at = [](int i, int j) { return i < 30 ? 8848.8 - j : -420.3 + j; };
-  compare(Scene({high}), {0.0, 50.0}, 2, "cliff of nine kilometres");
+  compare(Land({high}), {0.0, 50.0}, 2, "cliff of nine kilometres");
 }
 
 // Explicit points are evaluated in double: rims, corners and far origins at once.
@@ -208,7 +208,7 @@ TEST_F(CpuGpuParity, PointsAreTheCpusToAMicrometre) {
   far[1].at = [whole = far[1].at](int i, int j) {
     return i > 30 && i < 50 && j > 20 && j < 40 ? kHole : whole(i, j);
   };
-  const Scene scene(far);
+  const Land scene(far);
   std::mt19937_64 random(test_seed(3));
   Points points = random_points(scene.db().extent(), 20000, random);
   points.add(NAN, 0), points.add(INFINITY, 5e6), points.add(0, 0);
@@ -227,7 +227,7 @@ TEST_F(CpuGpuParity, PointsAreTheCpusToAMicrometre) {
 }
 
 TEST_F(CpuGpuParity, StrictWithholdsWhereTheErrorIsNotAvailable) {
-  const Scene scene(surveys());
+  const Land scene(surveys());
   const RasterFrame raster = turned_raster(scene.db().extent(), kSide, 8);
   for (BlendOptions options : all_blends()) {
     options.strict = true, options.error = 2;

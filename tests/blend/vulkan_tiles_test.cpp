@@ -53,12 +53,12 @@ std::vector<Tile> tiles_over(int side, int tile) {
 
 class VulkanTiles : public VulkanTest {
  protected:
-  static void SetUpTestSuite() { scene_ = std::make_unique<Scene>(surveys_with_a_hole()); }
+  static void SetUpTestSuite() { scene_ = std::make_unique<Land>(surveys_with_a_hole()); }
   static void TearDownTestSuite() { scene_.reset(); }
   static const Database& db() { return scene_->db(); }
-  static std::unique_ptr<Scene> scene_;
+  static std::unique_ptr<Land> scene_;
 };
-std::unique_ptr<Scene> VulkanTiles::scene_;
+std::unique_ptr<Land> VulkanTiles::scene_;
 
 TEST_F(VulkanTiles, ClassificationAndChoiceChangeNoBit) {
   const RasterFrame lattice = turned_raster(db().extent(), 130, 21);

@@ -1,0 +1,22 @@
+// Haze: far things take the colour of the air.
+#pragma once
+
+#include "render/picture.h"
+
+namespace patchwork {
+
+template <class T>
+class Fields;
+
+namespace effects {
+
+struct Haze {
+  double visibility = 50000;   ///< metres at which 2 % of the contrast is left
+  double base = 0;             ///< metres: the height where that holds
+  double scale_height = 8000;  ///< metres of height over which the air thins to 1/e
+  Color color{0xc3, 0xd3, 0xe3};
+};
+void describe(Fields<Haze>& fields);
+
+}  // namespace effects
+}  // namespace patchwork

@@ -1,0 +1,45 @@
+// What is known of the surface, laid over it in colours: its bound, its grid, its cost; and the mesh.
+#pragma once
+
+#include <optional>
+
+#include "render/picture.h"
+
+namespace patchwork {
+
+template <class T>
+class Fields;
+
+namespace effects {
+
+/// The bound that the blend gives, metres.
+struct ErrorOverlay {
+  std::optional<double> lowest, highest;  ///< metres; without: of what is in view
+  bool logarithmic = false;               ///< else where the bounds' skewness is above 1
+  double opacity = 0.8;
+};
+void describe(Fields<ErrorOverlay>& fields);
+
+/// Which grid answers.
+struct SourceOverlay {
+  double opacity = 0.6;
+};
+void describe(Fields<SourceOverlay>& fields);
+
+/// How many patches the blend read at a place.
+struct CostOverlay {
+  double highest = 6;  ///< patches at the end of the ramp
+  double opacity = 0.8;
+};
+void describe(Fields<CostOverlay>& fields);
+
+/// The edges of the triangles that are drawn.
+struct Wireframe {
+  double width = 1;  ///< pixels
+  Color color{0x10, 0x10, 0x10};
+  double opacity = 0.5;
+};
+void describe(Fields<Wireframe>& fields);
+
+}  // namespace effects
+}  // namespace patchwork

@@ -1,7 +1,6 @@
 #include "render/hillshade.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -9,6 +8,8 @@
 #include <vector>
 
 #include "db/error.h"
+#include "render/color.h"
+#include "render/legend.h"
 
 namespace patchwork {
 namespace {
@@ -98,59 +99,6 @@ Heights resized(Heights&& in) {
   return out;
 }
 
-// ---- colour: tints and shades are mixed in Oklab, where equal steps look equal
-
-struct Lab {
-  double l, a, b;
-};
-
-double linear(std::uint8_t v) {
-  const double c = v / 255.0;
-  return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-}
-
-std::uint8_t gamma_coded(double c) {
-  c = std::clamp(c, 0.0, 1.0);
-  return std::uint8_t(std::lround(255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055)));
-}
-
-// Bjorn Ottosson, "A perceptual color space for image processing" (2020), both ways.
-Lab lab_of(Color c) {
-  const double r = linear(c.r), g = linear(c.g), b = linear(c.b);
-  const double l = std::cbrt(0.4122214708 * r + 0.5363325363 * g + 0.0514459929 * b);
-  const double m = std::cbrt(0.2119034982 * r + 0.6806995451 * g + 0.1073969566 * b);
-  const double s = std::cbrt(0.0883024619 * r + 0.2817188376 * g + 0.6299787005 * b);
-  return {0.2104542553 * l + 0.7936177850 * m - 0.0040720468 * s,
-          1.9779984951 * l - 2.4285922050 * m + 0.4505937099 * s,
-          0.0259040371 * l + 0.7827717662 * m - 0.8086757660 * s};
-}
-
-Color color_of(const Lab& c) {
-  const auto cube = [](double v) { return v * v * v; };
-  const double l = cube(c.l + 0.3963377774 * c.a + 0.2158037573 * c.b);
-  const double m = cube(c.l - 0.1055613458 * c.a - 0.0638541728 * c.b);
-  const double s = cube(c.l - 0.0894841775 * c.a - 1.2914855480 * c.b);
-  return {gamma_coded(4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s),
-          gamma_coded(-1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s),
-          gamma_coded(-0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s)};
-}
-
-// `t` 0 (lowest) to 1 (highest): meadow, straw, ochre, rock, snow.
-Lab tint(double t) {
-  static const std::array<Lab, 6> stops = [] {
-    const Color colors[] = {{0x7d, 0xab, 0x8c}, {0xb2, 0xc8, 0x97}, {0xe2, 0xd9, 0xa6},
-                            {0xd5, 0xb3, 0x88}, {0xbf, 0xa0, 0x93}, {0xf2, 0xf1, 0xf0}};
-    std::array<Lab, 6> labs{};
-    std::transform(std::begin(colors), std::end(colors), labs.begin(), lab_of);
-    return labs;
-  }();
-  const double at = std::clamp(t, 0.0, 1.0) * (stops.size() - 1);
-  const size_t k = std::min(size_t(at), stops.size() - 2);
-  const double f = at - double(k);
-  const Lab &p = stops[k], &q = stops[k + 1];
-  return {p.l + f * (q.l - p.l), p.a + f * (q.a - p.a), p.b + f * (q.b - p.b)};
-}
-
 // ---- shade
 
 struct Slope {
@@ -180,7 +128,7 @@ double shade(const Slope& s, double exaggeration) {
 }
 
 // Chroma goes with lightness into the shadow, where a tint kept whole would turn garish.
-Lab shaded(const Lab& c, double s) {
+Oklab shaded(const Oklab& c, double s) {
   const double l = c.l + (s < 0 ? 0.75 : 0.45) * s, kept = std::clamp(l / c.l, 0.0, 1.0);
   return {l, c.a * kept, c.b * kept};
 }
@@ -200,7 +148,7 @@ double exaggeration_for(const std::vector<Slope>& slopes, const Heights& h) {
 struct Range {
   float low = kNone, high = kNone;
   bool gaps = false;
-  double part(double z) const { return high > low ? (z - low) / (double(high) - low) : 0.3; }
+  ValueScale scale() const { return {low, high, false}; }
 };
 
 Range range_of(std::span<const float> heights) {
@@ -229,38 +177,19 @@ Image relief(const Heights& h, const Range& range, double step, double& exaggera
         continue;
       }
       const double s = shade(slopes[size_t(y) * size_t(h.width) + size_t(x)], exaggeration);
-      image.at(x, y) = color_of(shaded(tint(range.part(z)), s));
+      image.at(x, y) = color_of(shaded(color_ramp(RampName::land).oklab(range.scale().part(z)), s));
     }
   return image;
 }
 
 // ---- legend
 
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
-
-// Ticks at round heights, four to ten of them.
-void draw_ramp(Canvas& canvas, int x, int top, int height, const Range& range) {
-  for (int r = 0; r < height; ++r)
-    canvas.fill_rect(x, top + r, 26, 1, color_of(tint((height - 0.5 - r) / height)));
-  canvas.frame_rect(x, top, 26, height, 1, {0x66, 0x66, 0x66});
-  if (!(range.high > range.low)) return canvas.text(x + 34, top + height / 2.0 + 5, number(range.low));
-  const double span = double(range.high) - range.low, step = round_down_125(span / 4);
-  for (double k = std::ceil(range.low / step); k * step <= range.high; ++k) {
-    const double y = top + height * (1 - range.part(k * step));
-    canvas.line({x + 26.0, y}, {x + 31.0, y}, 1, {0x66, 0x66, 0x66});
-    canvas.text(x + 36, y + 5, number(k * step == 0 ? 0 : k * step), {.size = 13});
-  }
-}
-
 void draw_legend(Canvas& canvas, int x, int top, int map_height, const Range& range) {
   if (!std::isnan(range.low)) {
-    canvas.text(x, top + 13, "Height, m", {.bold = true});
+    const RampLegend legend{"Height, m", &color_ramp(RampName::land), range.scale()};
+    canvas.text(x, top + 13, legend.title, {.bold = true});
     const int ramp = std::min(kRampHeight, map_height - 70);
-    draw_ramp(canvas, x, top + 28, ramp, range);
+    draw_ramp(canvas, x, top + 28, ramp, legend);
     top += ramp + 44;
   }
   if (!range.gaps) return;

@@ -6,24 +6,20 @@
 #include <map>
 
 #include "db/error.h"
+#include "render/color.h"
 
 namespace patchwork {
 namespace {
 
 constexpr int kMargin = 24, kGap = 32, kPanelWidth = 640, kPanelHeight = 820, kLeastPanel = 300;
 constexpr int kTitle = 40, kHeading = 26, kRow = 24, kFoot = 34;
-constexpr Color kInk{0x1c, 0x1c, 0x1c}, kFrame{0x88, 0x88, 0x88}, kOthers{0x8c, 0x8c, 0x8c};
+constexpr Color kInk{0x1c, 0x1c, 0x1c}, kFrame{0x88, 0x88, 0x88};
 
 // ColorBrewer's RdYlBu, safe for the colour-blind, without its two near-whites: red is small, blue large.
 constexpr Color kSizes[] = {{0xa5, 0x00, 0x26}, {0xd7, 0x30, 0x27}, {0xf4, 0x6d, 0x43},
                             {0xfd, 0xae, 0x61}, {0xfe, 0xe0, 0x90}, {0xab, 0xd9, 0xe9},
                             {0x74, 0xad, 0xd1}, {0x45, 0x75, 0xb4}, {0x31, 0x36, 0x95}};
 constexpr size_t kSizeColors = std::size(kSizes);
-
-// Okabe and Ito's colours, in the order in which they differ most.
-constexpr Color kGrids[] = {{0x00, 0x72, 0xb2}, {0xe6, 0x9f, 0x00}, {0x00, 0x9e, 0x73}, {0xcc, 0x79, 0xa7},
-                            {0x56, 0xb4, 0xe9}, {0xd5, 0x5e, 0x00}, {0xf0, 0xe4, 0x42}, {0x4d, 0x4d, 0x4d}};
-constexpr size_t kGridColors = std::size(kGrids);
 
 // One line of a legend: what the colour stands for and how many pixels have it.
 struct Entry {
@@ -100,18 +96,19 @@ GridLegend grid_legend(const PatchMapInput& in) {
   for (size_t g = 0; g < pixels.size(); ++g)
     if (pixels[g]) order.push_back(g);
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) { return pixels[a] > pixels[b]; });
-  legend.of.assign(in.grid_names.size(), kOthers);
+  legend.of.assign(in.grid_names.size(), class_color(kClassColors));
   size_t others = 0;
   for (size_t rank = 0; rank < order.size(); ++rank) {
-    if (rank >= kGridColors) {
+    if (rank >= kClassColors) {
       others += pixels[order[rank]];
       continue;
     }
-    legend.of[order[rank]] = kGrids[rank];
-    legend.entries.push_back({in.grid_names[order[rank]], kGrids[rank], pixels[order[rank]]});
+    legend.of[order[rank]] = class_color(rank);
+    legend.entries.push_back({in.grid_names[order[rank]], class_color(rank), pixels[order[rank]]});
   }
   if (others)
-    legend.entries.push_back({std::to_string(order.size() - kGridColors) + " more grids", kOthers, others});
+    legend.entries.push_back(
+        {std::to_string(order.size() - kClassColors) + " more grids", class_color(kClassColors), others});
   return legend;
 }
 
@@ -200,7 +197,7 @@ std::vector<Row> legend_rows(const PatchMapInput& in, const std::vector<Entry>& 
     answering += e.pixels;
   }
   if (filled)
-    rows.push_back({swatch([](int x, int y) { return striped(kGrids[0], x, y); }),
+    rows.push_back({swatch([](int x, int y) { return striped(class_color(0), x, y); }),
                     "striped: filled, not surveyed", share_text(filled, all)});
   if (answering < all) rows.push_back({swatch(hatch_color), "no data", share_text(all - answering, all)});
   return rows;

@@ -14,5 +14,11 @@ struct Curvature {
 };
 void describe(Fields<Curvature>& fields);
 
+/// Metres by which ground seems to sink at `distance` metres in the plane: the parabola of the earth's circle
+/// and the ray's.
+inline double drop(const Curvature& c, double distance) {
+  return distance * distance * (1 - c.refraction) / (2 * c.radius);
+}
+
 }  // namespace effects
 }  // namespace patchwork

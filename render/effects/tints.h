@@ -3,6 +3,8 @@
 
 #include <optional>
 
+#include "render/color.h"
+
 namespace patchwork {
 
 template <class T>
@@ -10,10 +12,8 @@ class Fields;
 
 namespace effects {
 
-enum class Ramp { land, viridis, cividis, grey };
-
 struct Tints {
-  Ramp ramp = Ramp::land;
+  RampName ramp = RampName::land;
   std::optional<double> lowest, highest;  ///< metres; without: of the terrain
 };
 void describe(Fields<Tints>& fields);

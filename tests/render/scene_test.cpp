@@ -52,7 +52,7 @@ TEST(Scene, ReadsEveryKindOfMember) {
   EXPECT_EQ(s.effects.sun->azimuth, 200);
   EXPECT_EQ(s.effects.sun->color, (Color{255, 0, 0}));
   EXPECT_EQ(s.effects.water->level, -3.5);
-  EXPECT_EQ(s.effects.tints->ramp, effects::Ramp::cividis);
+  EXPECT_EQ(s.effects.tints->ramp, RampName::cividis);
   EXPECT_FALSE(s.effects.tints->lowest);
   EXPECT_EQ(*s.effects.tints->highest, 900);
 }

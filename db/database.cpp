@@ -21,6 +21,7 @@ namespace {
 // (on a mosaic of 12 300 patches that was a third of the time).
 // The structure's share, a quarter, holds the records and tree pages of 10^9 samples.
 constexpr std::size_t kChunkShare = 64, kSurfaceShare = 32, kStructureShare = 4;
+constexpr const char* kRemark = "remark ";  // before the names of remarks among the store's facts
 constexpr const char* kRestore =
     "see: patchwork check; restore the file from a copy, or import the grid again";
 constexpr const char* kRepair = "run: patchwork check --repair, which makes it from the patches";
@@ -335,6 +336,15 @@ std::shared_ptr<const PatchSurface> Database::surface(PatchId id) const {
     if (patch(id).ragged()) s->holes = make_holes(window, level, id.bx(), id.by());
     return s;
   });
+}
+
+std::optional<std::string> Database::remark(const std::string& name) const {
+  const std::lock_guard lock(impl_->store_mutex);
+  return impl_->store->fact(kRemark + name);
+}
+
+void Database::keep_remark(const std::string& name, const std::string& text) {
+  impl_->change([&] { return impl_->store->set_fact(kRemark + name, text), true; });
 }
 
 void Database::read_samples(GridId id, int row, int rows, std::span<double> out) const {

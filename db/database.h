@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <shared_mutex>
 #include <span>
 #include <string>
@@ -114,6 +115,11 @@ class Database {
   /// Raw samples of a grid as its file had them (see GridInfo::raw_scale), rows [row, row + rows), row-major;
   /// NaN where there is no data. REQUIRES: the rows are inside the grid, and `out` holds them.
   void read_samples(GridId grid, int row, int rows, std::span<double> out) const;
+
+  /// What was found out about the database and is kept in its file, by name: no part of its content, hash or
+  /// version. Keeping takes one transaction, and throws Error where the file is not open for writing.
+  std::optional<std::string> remark(const std::string& name) const;
+  void keep_remark(const std::string& name, const std::string& text);
 
   struct Impl;
 

@@ -1,6 +1,5 @@
 #include "query/cost_model.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <bit>
 #include <chrono>
@@ -26,31 +25,10 @@ double largest_error(const Database& db) {
   return most;
 }
 
-// Least squares of relative errors, with no cost below zero: what would be is left out.
-CostModel fit(const std::vector<Cost>& costs) {
-  std::array<bool, 3> used{true, true, true};
-  Eigen::Vector3d x;
-  do {
-    Eigen::MatrixXd a(Eigen::Index(costs.size()), 3);
-    for (Eigen::Index r = 0; r < a.rows(); ++r) {
-      const Cost& c = costs[std::size_t(r)];
-      a.row(r) << 1, double(c.nodes), double(c.patches);
-      a.row(r) /= c.seconds;
-    }
-    for (int k = 0; k < 3; ++k)
-      if (!used[std::size_t(k)]) a.col(k).setZero();
-    x = a.completeOrthogonalDecomposition().solve(Eigen::VectorXd::Ones(a.rows()));
-    Eigen::Index worst;
-    if (x.minCoeff(&worst) >= 0) break;
-    used[std::size_t(worst)] = false;
-  } while (true);
-  return {x[0], x[1], x[2]};
-}
-
 }  // namespace
 
 CostModel calibrate(const Database& db) {
-  std::vector<Cost> costs;
+  std::vector<Measured> costs;
   const double start = now();
   for (double error = largest_error(db); costs.size() < 4 || now() - start < kCalibration; error /= 2) {
     if (costs.size() > std::size_t(kRungs)) break;
@@ -58,8 +36,8 @@ CostModel calibrate(const Database& db) {
     Cost best = extract(db, cut).cost;  // the first reading; its time counts only if none is better
     for (int again = 0; again < 2; ++again)
       best.seconds = std::min(best.seconds, extract(db, cut).cost.seconds);
-    best.seconds = std::max(best.seconds, 1e-9);
-    costs.push_back(best);
+    costs.push_back(
+        {.pages = double(best.nodes), .patches = double(best.patches), .find = std::max(best.seconds, 1e-9)});
   }
   return fit(costs);
 }

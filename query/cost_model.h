@@ -3,22 +3,49 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
+#include <span>
+#include <string>
 
 #include "query/extract.h"
 
 namespace patchwork {
 
-/// Seconds that an extraction takes once the pages and records that it reads are in memory.
+/// Seconds that the parts of an answer take on one machine: finding patches once the pages and records that
+/// are read for it are in memory; reading and decoding patches from the file; evaluating heights on all
+/// cores.
 struct CostModel {
-  double fixed = 0;  ///< seconds
-  double page = 0;   ///< seconds a page of the R-tree
-  double patch = 0;  ///< seconds a patch of the answer
+  double fixed = 0, page = 0, patch = 0;                ///< finding: at all, a page of the R-tree, a patch
+  double read_fixed = 0, read_patch = 0;                ///< reading: at all, a patch
+  double blend_fixed = 0, blend_patch = 0, sample = 0;  ///< evaluating (k = 0): at all, a patch, a height
   double seconds(double pages, double patches) const { return fixed + page * pages + patch * patches; }
+  double read_seconds(double patches) const { return read_fixed + read_patch * patches; }
+  double blend_seconds(double patches, double samples) const {
+    return blend_fixed + blend_patch * patches + sample * samples;
+  }
+  bool knows_heights() const { return read_patch > 0 && sample > 0; }  ///< not only how long finding takes
 };
 
-/// Measures this database on this machine: answers to uniform cuts, coarse ones first, for a tenth of a
-/// second.
+/// One answer and the seconds that its parts took; a part that was not measured has none.
+struct Measured {
+  double pages = 0, patches = 0, samples = 0;
+  double find = 0, read = 0, blend = 0;
+};
+/// Least squares of relative errors, with no cost below zero. REQUIRES: not empty.
+CostModel fit(std::span<const Measured> answers);
+
+/// The model that `patchwork cost` left in the database, if it was measured on this kind of machine.
+std::optional<CostModel> saved_model(const Database& db);
+/// REQUIRES: `db` is open for writing. Content, hash and version stay.
+void save_model(Database& db, const CostModel& model);
+/// What this machine is called in a saved model: processor and number of threads.
+std::string machine_name();
+
+/// Measures how long finding takes with this database on this machine: answers to uniform cuts, coarse ones
+/// first, for a tenth of a second.
 CostModel calibrate(const Database& db);
+/// The saved model, else a new one of finding alone.
+CostModel model_of(const Database& db);
 
 /// Reads the inner pages that the cut meets and at most kSampledLeaves of the pages below them, evenly
 /// chosen, so `patches` and `bytes` are an estimate and exact where there are no more; `boxes` counts what

@@ -67,5 +67,88 @@ TEST_F(CostModelTest, ErrorFallsWithTheTimeThatMayBeTaken) {
   EXPECT_EQ(last, 0);
 }
 
+TEST(CostModel, FitFindsTheCostsThatTimesWereMadeOf) {
+  const CostModel truth{.fixed = 2e-6,
+                        .page = 3e-7,
+                        .patch = 2e-8,
+                        .read_fixed = 1e-4,
+                        .read_patch = 5e-6,
+                        .blend_fixed = 3e-5,
+                        .blend_patch = 1e-6,
+                        .sample = 2e-8};
+  std::vector<Measured> answers;
+  for (const double pages : {1, 3, 10, 40})
+    for (const double samples : {1e3, 1e5}) {
+      const double patches = pages * pages * 7;
+      answers.push_back({pages, patches, samples, truth.seconds(pages, patches), truth.read_seconds(patches),
+                         truth.blend_seconds(patches, samples)});
+    }
+  const CostModel found = fit(answers);
+  EXPECT_NEAR(found.fixed, truth.fixed, 1e-9 * truth.fixed);
+  EXPECT_NEAR(found.page, truth.page, 1e-9 * truth.page);
+  EXPECT_NEAR(found.patch, truth.patch, 1e-9 * truth.patch);
+  EXPECT_NEAR(found.read_patch, truth.read_patch, 1e-9 * truth.read_patch);
+  EXPECT_NEAR(found.blend_patch, truth.blend_patch, 1e-9 * truth.blend_patch);
+  EXPECT_NEAR(found.sample, truth.sample, 1e-9 * truth.sample);
+  EXPECT_TRUE(found.knows_heights());
+}
+
+TEST(CostModel, FitLeavesOutCostsThatWouldBeBelowZero) {
+  // More pages take less time: no page is paid for, and what is left explains what it can.
+  const Measured answers[] = {{.pages = 1, .patches = 10, .find = 9e-6},
+                              {.pages = 5, .patches = 10, .find = 5e-6},
+                              {.pages = 9, .patches = 20, .find = 6e-6}};
+  const CostModel found = fit(answers);
+  EXPECT_EQ(found.page, 0);
+  EXPECT_GE(found.fixed, 0);
+  EXPECT_GE(found.patch, 0);
+  EXPECT_GT(found.fixed + found.patch, 0);
+  EXPECT_FALSE(found.knows_heights()) << "nothing was said of them";
+}
+
+TEST(CostModel, IsKeptInTheDatabaseAndIsNoPartOfItsContent) {
+  const GridFolder folder;
+  Database db = folder.database();
+  folder.add(db, of_terrain({}, rough), "base");
+  EXPECT_FALSE(saved_model(db));
+  const std::string hash = db.content_hash();
+  const std::uint64_t version = db.version();
+  const CostModel model{1e-6, 2e-6, 3e-6, 4e-6, 5e-6, 6e-6, 7e-6, 8e-6};
+  save_model(db, model);
+  EXPECT_EQ(db.content_hash(), hash);
+  EXPECT_EQ(db.version(), version);
+  EXPECT_TRUE(db.check().empty());
+  const Database again = Database::open(db.path());
+  EXPECT_EQ(again.content_hash(), hash);
+  const std::optional<CostModel> kept = saved_model(again);
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->seconds(3, 5), model.seconds(3, 5));
+  EXPECT_EQ(kept->read_seconds(7), model.read_seconds(7));
+  EXPECT_EQ(kept->blend_seconds(7, 11), model.blend_seconds(7, 11));
+  EXPECT_EQ(model_of(again).sample, model.sample) << "what is kept is used";
+  EXPECT_FALSE(refusal_of([&] { Database::open(db.path()).keep_remark("a", "b"); }).empty());
+}
+
+TEST(CostModel, OfAnotherMachineOrDamagedIsNotUsed) {
+  const GridFolder folder;
+  Database db = folder.database();
+  folder.add(db, of_terrain({}, rough), "base");
+  save_model(db, {1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6});
+  const std::string sound = *db.remark("cost model");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = sound;
+    text.replace(text.find(from), from.size(), to);
+    db.keep_remark("cost model", text);
+    return saved_model(db).has_value();
+  };
+  EXPECT_TRUE(with("1e-06", "1e-05")) << "negative control: what is sound is taken";
+  EXPECT_FALSE(with(machine_name(), "another one"));
+  EXPECT_FALSE(with("1e-06", "-1e-06"));
+  EXPECT_FALSE(with("1e-06", "\"much\""));
+  EXPECT_FALSE(with("\"sample\"", "\"simple\""));
+  EXPECT_FALSE(with("{", ""));
+  EXPECT_EQ(model_of(db).sample, 0) << "a new one knows of finding alone";
+}
+
 }  // namespace
 }  // namespace patchwork

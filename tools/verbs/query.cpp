@@ -98,7 +98,7 @@ Question question(const Database& db, const Options& o) {
 Asked ask(const Database& db, const Options& o, const Question& q) {
   if (!o.budgeted()) return {extract(db, *q.cut_at(q.error), o.strict), q.error, q.unit};
   if (o.milliseconds > 0) {
-    const Budgeted b = extract_in_time(db, calibrate(db), o.milliseconds / 1000, q.most, q.cut_at);
+    const Budgeted b = extract_in_time(db, model_of(db), o.milliseconds / 1000, q.most, q.cut_at);
     return {b.extraction, b.error, q.unit};
   }
   const Budget budget{o.patches > 0 ? o.patches : SIZE_MAX, o.bytes > 0 ? o.bytes : SIZE_MAX};
@@ -114,19 +114,29 @@ Json json_of(const Cost& c) {
           {"seconds", c.seconds}};
 }
 
-// What the answer will cost, without the answer.
+// What the answer will cost, without the answer. What reading and evaluating cost is known once `patchwork
+// cost` has measured it.
 void explain(const Database& db, const Question& q, const Common& common) {
-  const CostModel model = calibrate(db);
+  const CostModel model = model_of(db);
   const Cost c = expect(db, *q.cut_at(q.error), model);
-  if (common.json)
-    return print({{"error", q.error},
-                  {"unit", q.unit},
-                  {"expected", json_of(c)},
-                  {"model", {{"seconds", model.fixed}, {"page", model.page}, {"patch", model.patch}}}});
+  const double read = model.read_seconds(double(c.patches)),
+               million = model.blend_seconds(double(c.patches), 1e6);
+  if (common.json) {
+    Json j{{"error", q.error},
+           {"unit", q.unit},
+           {"expected", json_of(c)},
+           {"model", {{"seconds", model.fixed}, {"page", model.page}, {"patch", model.patch}}}};
+    if (model.knows_heights())
+      j["expected"].update({{"read_seconds", read}, {"blend_seconds_of_a_million_heights", million}});
+    return print(j);
+  }
   fmt::print("expected at error {:g} {}: {} patches, {:.2f} MB of samples, {:.3f} ms\n", q.error, q.unit,
              c.patches, double(c.bytes) / 1e6, 1000 * c.seconds);
   fmt::print("  {} pages and {} boxes of the R-tree; {:.3g} us + {:.3g} us a page + {:.3g} us a patch\n",
              c.nodes, c.boxes, 1e6 * model.fixed, 1e6 * model.page, 1e6 * model.patch);
+  if (model.knows_heights())
+    fmt::print("  then {:.3g} ms to read them from the file, {:.3g} ms for a million heights\n", 1e3 * read,
+               1e3 * million);
 }
 
 Json json_of(const Database& db, PatchId id) {

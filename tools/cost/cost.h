@@ -1,0 +1,99 @@
+// What `patchwork cost` measures: rows of knobs, the uniform grid beside them, and what is made of both.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "query/cost_model.h"
+#include "tools/bench/bench.h"
+#include "tools/cli.h"
+
+namespace patchwork::cli {
+
+struct CostOptions {
+  std::string database, folder;
+  std::vector<double> extent;  ///< xmin ymin xmax ymax; empty: all, or as much as kMostPatches allow
+  std::vector<double> eye,
+      look;  ///< of the view whose pixel error is a knob; empty: over the south-west corner
+  double fov = 60;
+  int side = 512;        ///< heights along each side of the picture
+  int runs = 5;          ///< measured; one more comes before to warm up
+  int points = 1 << 17;  ///< at which errors are measured
+};
+
+/// The best answer may have this many patches; a database with more is looked at in its middle.
+inline constexpr std::size_t kMostPatches = 60000;
+
+/// Errors in the unit of a row: metres, or pixels of the view.
+struct ErrorFigures {
+  double max = 0, p99 = 0, rms = 0;
+};
+
+/// Milliseconds of the stages, over the runs. What was not there to be measured has no values.
+struct Stages {
+  std::vector<double> query, fetch, blend;
+  std::vector<double> total() const;    ///< of each run
+  std::vector<double> at_hand() const;  ///< of each run, without fetch: patches are in memory
+};
+
+/// One setting of one knob.
+struct CostRow {
+  std::string knob, value;
+  std::string unit = "m";  ///< of the errors: m or px
+  std::optional<double> asked = {},
+                        bound = {};  ///< largest guaranteed error at the points; a uniform grid has none
+  double bound_p99 = 0;              ///< of the points
+  ErrorFigures error = {};           ///< measured against the best available, in double
+  std::size_t patches = 0, bytes = 0, file_bytes = 0;
+  Stages ms = {};
+  double samples = 0;
+  std::optional<Cost> found = {}, expected = {};  ///< where the model can say something: what it goes by
+  std::optional<double> predicted = {};           ///< milliseconds of all stages
+  bool fitted = false;                            ///< the model was made from it
+  std::size_t beyond = 0;  ///< points farther from the best than both bounds allow, or without an answer
+};
+
+/// What a time buys: the finest step of the ladder whose median is at most `ms`.
+struct Bargain {
+  double ms = 0;
+  std::string what;                ///< e.g. "256 x 256 heights, patches at hand"
+  std::optional<std::size_t> row;  ///< none: not even the coarsest
+};
+
+struct CostReport {
+  std::string machine, engine, content_hash;  ///< engine: the graphics card, empty where there is none
+  int threads = 0, side = 0, runs = 0, points = 0;
+  Extent extent;
+  std::vector<CostRow> rows;
+  std::vector<std::string> notes;
+  std::size_t knee = 0;  ///< place in rows
+  std::vector<Bargain> bargains;
+  std::vector<std::string> bought;  ///< columns of the table of bargains, in order
+  CostModel model;
+  double r_squared = 0, worst_ratio = 1;  ///< of predictions of rows that the model was not made from
+  std::size_t beyond() const;
+  std::vector<std::size_t> of(const std::string& knob) const;  ///< places in rows
+};
+
+/// Measures everything; saves nothing. Throws Error.
+CostReport measure_cost(const CostOptions& options, const Common& common);
+
+/// The model from every second step of the ladders; predictions of all other rows of the default blend.
+void fit_model(CostReport& report);
+void find_knee(CostReport& report);
+void find_bargains(CostReport& report);
+
+/// cost.csv, cost.json, the plots and index.html in `folder`; returns the names. Throws Error: gnuplot or
+/// the disk.
+std::vector<std::string> write_cost(const CostReport& report, const std::string& folder);
+/// The plots as SVG texts, by name. `scratch` is a folder for gnuplot's files.
+std::vector<std::pair<std::string, std::string>> draw_cost(const CostReport& report,
+                                                           const std::string& scratch);
+std::string cost_page(const CostReport& report,
+                      const std::vector<std::pair<std::string, std::string>>& plots);
+double median(const std::vector<double>& values);  ///< REQUIRES: not empty
+/// A number for people: three digits, no exponent between 0.001 and 100 000.
+std::string figure(double value);
+
+}  // namespace patchwork::cli

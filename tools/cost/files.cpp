@@ -1,0 +1,91 @@
+// cost.csv, cost.json, plots and page.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "db/error.h"
+#include "tools/cost/cost.h"
+
+namespace patchwork::cli {
+
+namespace {
+
+void write_file(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream out(path, std::ios::binary);
+  out << text;
+  if (!out.flush()) throw Error(path.string(), "it cannot be written", "is the disk full?");
+}
+
+Json number(const std::optional<double>& v) { return v ? Json(*v) : Json(); }
+
+void put_stage(Json& j, const std::string& name, const std::vector<double>& ms) {
+  const bool there = !ms.empty();
+  const Spread s = there ? Spread::of(ms) : Spread{};
+  j["ms_" + name] = there ? Json(s.median) : Json();
+  j["ms_" + name + "_min"] = there ? Json(s.min) : Json();
+  j["ms_" + name + "_max"] = there ? Json(s.max) : Json();
+}
+
+// Keys in the order of the CSV's columns: first those that programs rely on.
+Json json_of(const CostRow& r) {
+  Json j{{"knob", r.knob},           {"value", r.value},         {"error_asked", number(r.asked)},
+         {"bound", number(r.bound)}, {"error_max", r.error.max}, {"error_p99", r.error.p99},
+         {"error_rms", r.error.rms}, {"patches", r.patches},     {"bytes", r.bytes}};
+  Json spreads = Json::object();
+  put_stage(spreads, "query", r.ms.query), put_stage(spreads, "fetch", r.ms.fetch);
+  put_stage(spreads, "blend", r.ms.blend), put_stage(spreads, "tessellate", {}),
+      put_stage(spreads, "draw", {});
+  put_stage(spreads, "total", r.ms.total());
+  for (const char* stage : {"query", "fetch", "blend", "tessellate", "draw", "total"})
+    j[std::string("ms_") + stage] = spreads[std::string("ms_") + stage];
+  j["bound_p99"] = r.bound ? Json(r.bound_p99) : Json();
+  j["unit"] = r.unit, j["samples"] = r.samples, j["file_bytes"] = r.file_bytes;
+  j["predicted_ms"] = number(r.predicted), j["fitted"] = r.fitted, j["beyond"] = r.beyond;
+  j.update(spreads);
+  return j;
+}
+
+std::string csv_of(const Json& rows) {
+  std::string text;
+  for (const auto& [key, value] : rows.front().items()) text += (text.empty() ? "" : ",") + key;
+  text += "\n";
+  for (const Json& row : rows) {
+    std::string line;
+    bool first = true;
+    for (const auto& [key, value] : row.items()) {
+      if (!first) line += ",";
+      first = false;
+      if (!value.is_null()) line += value.is_string() ? value.get<std::string>() : value.dump();
+    }
+    text += line + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string figure(double v) {
+  if (v == 0 || !std::isfinite(v)) return fmt::format("{:g}", v);
+  const double size = std::abs(v);
+  if (size < 1e-3 || size >= 1e5) return fmt::format("{:.2e}", v);
+  const int digits = std::max(0, 2 - int(std::floor(std::log10(size))));
+  return fmt::format("{:.{}f}", v, digits);
+}
+
+std::vector<std::string> write_cost(const CostReport& report, const std::string& folder) {
+  const std::filesystem::path to(folder);
+  Json rows = Json::array();
+  for (const CostRow& r : report.rows) rows.push_back(json_of(r));
+  write_file(to / "cost.json", rows.dump(2) + "\n");
+  write_file(to / "cost.csv", csv_of(rows));
+  std::vector<std::string> names{"cost.csv", "cost.json"};
+  const auto plots = draw_cost(report, folder);
+  for (const auto& [name, svg] : plots) write_file(to / (name + ".svg"), svg), names.push_back(name + ".svg");
+  write_file(to / "index.html", cost_page(report, plots));
+  names.push_back("index.html");
+  return names;
+}
+
+}  // namespace patchwork::cli

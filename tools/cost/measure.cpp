@@ -1,0 +1,390 @@
+// The knobs of `patchwork cost`, one at a time, each setting in turn: A B C A B C, so that what disturbs the
+// machine disturbs all.
+#include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/info.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "blend/vulkan/vulkan_blend.h"
+#include "db/error.h"
+#include "tools/cost/check_points.h"
+#include "tools/cost/uniform_grid.h"
+#include "tools/resampler.h"
+#include "tools/sample_dataset.h"
+
+namespace patchwork::cli {
+
+namespace {
+
+constexpr int kSteps = 15;  // of the ladder of errors, 0 among them
+constexpr int kMiddle = 7;  // the step at which the other knobs are turned
+constexpr double kPixelErrors[] = {0.5, 1, 2, 4, 8, 16, 32, 50};
+constexpr double kTolerances[] = {0, 0.01, 0.1, 1};  // metres
+constexpr int kTiles[] = {17, 33, 65, 129};          // vertices along each side
+constexpr std::size_t kMostSamples = 100'000'000;    // that are stored again for the tolerances
+
+// One setting of one knob, ready to be measured.
+struct Setting {
+  std::string knob, value, unit = "m";
+  double asked = 0;
+  std::shared_ptr<const CutSurface> cut;
+  Extent window{};
+  std::span<const double> scale{};  // see CheckPoints::compare
+  const Database* db = nullptr;
+  BlendOptions blend{};
+  bool vulkan = false, comparable = true;
+  int tile = 64, side = 0, threads = 0;
+};
+
+class Bench {
+ public:
+  Bench(const CostOptions& o, const Common& common)
+      : o_(o),
+        common_(common),
+        folder_({}),
+        db_(Database::open(o.database, common.memory)),
+        bar_(common, "cost") {
+    if (db_.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+    extent_ = choose_extent();
+    // The patches of every answer fit into the cache, so that reading them is apart from evaluating them.
+    const std::size_t best = extract(db_, uniform(0)).patches.size();
+    memory_ = std::max<std::uint64_t>(common.memory, 40 * best * sizeof(PatchSurface));
+    db_ = Database::open(o.database, memory_);
+    points_ = std::make_unique<CheckPoints>(db_, extent_, o.points);
+    grid_ = std::make_unique<UniformGrid>(db_, extent_, *points_, folder_.path("uniform.tif"), common.memory);
+    open_device();
+    make_ladder();
+  }
+
+  CostReport run() {
+    report_.machine = machine_name(), report_.content_hash = db_.content_hash();
+    report_.threads = threads(), report_.side = o_.side, report_.runs = o_.runs;
+    report_.points = int(points_->size()), report_.extent = extent_;
+    if (!grid_->complete())
+      report_.notes.push_back(
+          fmt::format("the uniform grid has a step of {:.4g} m: the finest of the grids "
+                      "would take more than {} samples along a side",
+                      grid_->step(), UniformGrid::kMostSide));
+    for (const int side : {o_.side, o_.side / 2, o_.side / 8}) errors(side), bar_.show(0.1);
+    pixel_errors(), bar_.show(0.4);
+    blends(), engines(), bar_.show(0.6);
+    sides(), thread_counts(), bar_.show(0.7);
+    uniform_grid(), bar_.show(0.8);
+    tolerances(), bar_.show(1);
+    return std::move(report_);
+  }
+
+ private:
+  int threads() const { return common_.threads > 0 ? common_.threads : tbb::info::default_concurrency(); }
+  UniformCut uniform(double error) const { return {.error = error, .region = Region::inside(extent_)}; }
+
+  // Beyond its outer samples a grid is continued, and its bounds tell of little else.
+  Extent within_samples() const {
+    Extent all{INFINITY, INFINITY, -INFINITY, -INFINITY};
+    for (const Grid& g : db_.grids()) {
+      const Extent e = g.info.frame.bounds({0, 0, g.info.shape.width() - 1., g.info.shape.height() - 1.});
+      all = {std::min(all.xmin, e.xmin), std::min(all.ymin, e.ymin), std::max(all.xmax, e.xmax),
+             std::max(all.ymax, e.ymax)};
+    }
+    return all;
+  }
+
+  // All of it, or a square in its middle whose best answer is not larger than kMostPatches.
+  Extent choose_extent() {
+    Extent e = within_samples();
+    if (o_.extent.size() == 4) {
+      e = {o_.extent[0], o_.extent[1], o_.extent[2], o_.extent[3]};
+      if (!(e.xmin < e.xmax && e.ymin < e.ymax && e.meets(db_.extent())))
+        throw Error("--extent", "it is empty or lies beside the database", "see: patchwork info");
+    }
+    for (;;) {
+      const std::size_t n = extract(db_, {.error = 0, .region = Region::inside(e)}).patches.size();
+      if (n <= kMostPatches) return e;
+      report_.notes = {"measured in the middle of the database only, whose best answer has more than " +
+                       std::to_string(kMostPatches) + " patches"};
+      const double part = std::min(0.7, std::sqrt(double(kMostPatches) / double(n))),
+                   x = (e.xmin + e.xmax) / 2, y = (e.ymin + e.ymax) / 2,
+                   half = part * std::min(e.xmax - e.xmin, e.ymax - e.ymin) / 2;
+      e = {x - half, y - half, x + half, y + half};
+    }
+  }
+
+  void open_device() {
+    try {
+      device_ = Device::open();
+      report_.engine = device_->name();
+    } catch (const Error& e) {
+      report_.notes.push_back(fmt::format("no graphics card was measured: {}", e.what()));
+    }
+  }
+
+  // From the error at which the answer begins to differ from the best one to that of the coarsest patch.
+  void make_ladder() {
+    double low = 1e-6, high = 0;
+    for (const Grid& g : db_.grids()) high = std::max(high, g.patches[g.patches.size() - 1].bottom);
+    const std::vector<PatchId> best = extract(db_, uniform(0)).patches;
+    double differs = std::max(high, 2 * low);
+    while (differs > 1.01 * low) {
+      const double middle = std::sqrt(low * differs);
+      (extract(db_, uniform(middle)).patches == best ? low : differs) = middle;
+    }
+    ladder_ = {0};
+    for (int s = 1; s < kSteps; ++s)
+      ladder_.push_back(low * std::pow(std::max(high / low, 1.), double(s - 1) / (kSteps - 2)));
+  }
+
+  Setting setting(const std::string& knob, const std::string& value, double error) const {
+    return {.knob = knob,
+            .value = value,
+            .asked = error,
+            .cut = make_surface(uniform(error)),
+            .window = extent_,
+            .db = &db_,
+            .side = o_.side,
+            .threads = threads()};
+  }
+  Setting setting(const std::string& knob, const std::string& value) const {
+    return setting(knob, value, ladder_[kMiddle]);
+  }
+
+  RasterFrame frame(const Setting& s) const {
+    const double dx = (s.window.xmax - s.window.xmin) / s.side, dy = (s.window.ymax - s.window.ymin) / s.side;
+    return {s.window.xmin + dx / 2, dx, 0, s.window.ymax - dy / 2, 0, -dy};
+  }
+
+  std::unique_ptr<Evaluator> evaluator(const Setting& s, const Database& db, const Extraction& x) const {
+    if (!s.vulkan) return std::make_unique<Blend>(db, x.patches, s.blend);
+    return std::make_unique<VulkanBlend>(
+        device_, db, x.patches, s.blend,
+        VulkanOptions{.memory = std::max<std::uint64_t>(common_.memory / 4, x.patches.size() * 16384),
+                      .tile = s.tile});
+  }
+
+  CostRow facts(const Setting& s) const {
+    const Extraction x = extract(*s.db, *s.cut);
+    CostRow row{.knob = s.knob, .value = s.value, .unit = s.unit, .asked = s.asked};
+    row.patches = x.patches.size(), row.bytes = x.cost.bytes, row.file_bytes = s.db->file_bytes();
+    row.samples = double(s.side) * s.side;
+    if (s.comparable) row.found = x.cost, row.expected = expect(*s.db, *s.cut, {});
+    points_->compare(*evaluator(s, *s.db, x), s.scale, s.vulkan, row);
+    return row;
+  }
+
+  void once(const Setting& s, Stages& ms) const {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(s.threads));
+    const Extraction x = extract(*s.db, *s.cut);
+    const Database fresh = Database::open(s.db->path(), memory_);  // nothing of it is in memory yet
+    const auto fetching = std::chrono::steady_clock::now();
+    prefetch(fresh, x.patches, memory_);
+    std::unique_ptr<Evaluator> surface;
+    if (s.vulkan) surface = evaluator(s, fresh, x);  // what is sent to the card
+    const double fetch = seconds_since(fetching);
+    const auto blending = std::chrono::steady_clock::now();
+    if (!surface) surface = evaluator(s, fresh, x);
+    std::vector<float> heights(std::size_t(s.side) * std::size_t(s.side));
+    surface->at_pixels(frame(s), s.side, 0, s.side,
+                       {.height = {}, .bound = {}, .source = {}, .patch = {}, .height32 = heights});
+    ms.query.push_back(1e3 * x.cost.seconds), ms.fetch.push_back(1e3 * fetch);
+    ms.blend.push_back(1e3 * seconds_since(blending));
+  }
+
+  void measure(const std::vector<Setting>& settings) {
+    const std::size_t first = report_.rows.size();
+    for (const Setting& s : settings) report_.rows.push_back(facts(s));
+    for (int r = 0; r <= o_.runs; ++r)
+      for (std::size_t k = 0; k < settings.size(); ++k) {
+        Stages warming;
+        once(settings[k], r > 0 ? report_.rows[first + k].ms : warming);
+      }
+  }
+
+  void errors(int side) {
+    std::vector<Setting> all;
+    for (const double error : ladder_) {
+      all.push_back(setting(side == o_.side ? "error" : fmt::format("error_{}", side),
+                            fmt::format("{:.4g}", error), error));
+      all.back().side = side;
+    }
+    measure(all);
+  }
+
+  ViewCut view() const {
+    const double w = extent_.xmax - extent_.xmin, h = extent_.ymax - extent_.ymin;
+    ViewCut v{.eye = {extent_.xmin + 0.1 * w, extent_.ymin + 0.1 * h, 0},
+              .look = {extent_.xmin + 0.6 * w, extent_.ymin + 0.6 * h, 0},
+              .fov_degrees = o_.fov};
+    for (const Grid& g : db_.grids()) v.look.z = std::max(v.look.z, g.info.highest);
+    v.eye.z = v.look.z + 0.05 * std::min(w, h);
+    if (o_.eye.size() == 3) v.eye = {o_.eye[0], o_.eye[1], o_.eye[2]};
+    if (o_.look.size() == 3) v.look = {o_.look[0], o_.look[1], o_.look[2]};
+    return over_terrain_of(db_, v);
+  }
+
+  // Pixels a metre at the points that the view sees.
+  std::vector<double> pixels_a_metre(const ViewCut& one_pixel) const {
+    const std::vector<Point> corners = footprint(one_pixel);
+    const auto surface = make_surface(one_pixel);
+    const auto sees = [&](Point at) {
+      for (std::size_t c = 0; c < corners.size(); ++c) {
+        const Point &p = corners[c], &q = corners[(c + 1) % corners.size()];
+        if ((q.x - p.x) * (at.y - p.y) - (q.y - p.y) * (at.x - p.x) < 0) return false;
+      }
+      return corners.size() >= 3;
+    };
+    std::vector<double> scale;
+    for (std::size_t k = 0; k < points_->size(); ++k) {
+      const Point at{points_->x()[k], points_->y()[k]};
+      const double metres = surface->at(at);
+      scale.push_back(sees(at) && metres > 0 ? 1 / metres : -1);
+    }
+    return scale;
+  }
+
+  void pixel_errors() {
+    ViewCut v = view();
+    v.pixel_error = 1;
+    scale_ = pixels_a_metre(v);
+    if (std::none_of(scale_.begin(), scale_.end(), [](double s) { return s > 0; })) {
+      report_.notes.push_back("the view sees nothing of the extent: no pixel errors");
+      return;
+    }
+    window_ = {INFINITY, INFINITY, -INFINITY, -INFINITY};
+    for (const Point p : footprint(v))
+      window_ = {std::min(window_.xmin, p.x), std::min(window_.ymin, p.y), std::max(window_.xmax, p.x),
+                 std::max(window_.ymax, p.y)};
+    window_ = {std::max(window_.xmin, extent_.xmin), std::max(window_.ymin, extent_.ymin),
+               std::min(window_.xmax, extent_.xmax), std::min(window_.ymax, extent_.ymax)};
+    std::vector<Setting> all;
+    for (const double pixels : kPixelErrors) {
+      v.pixel_error = pixels;
+      Setting s = setting("pixel_error", fmt::format("{:g}", pixels), pixels);
+      s.unit = "px", s.cut = make_surface(v), s.window = window_, s.scale = scale_;
+      all.push_back(s);
+    }
+    measure(all);
+  }
+
+  void blends() {
+    std::vector<Setting> all;
+    for (const int k : {0, 1, 2}) {
+      all.push_back(setting("smoothness", std::to_string(k)));
+      all.back().blend.smoothness = k, all.back().comparable = k == 0;
+    }
+    for (const char* name : {"priority", "weighted"}) {
+      all.push_back(setting("blend", name));
+      const bool weighted = std::string(name) == "weighted";
+      all.back().comparable = !weighted;
+      if (weighted) all.back().blend.composition = Composition::weighted;
+    }
+    measure(all);
+  }
+
+  void engines() {
+    std::vector<Setting> all{setting("engine", "cpu")};
+    if (device_) {
+      all.push_back(setting("engine", "vulkan"));
+      all.back().vulkan = true, all.back().comparable = false;
+      for (const int tile : kTiles) {
+        all.push_back(setting("tile", std::to_string(tile)));
+        all.back().vulkan = true, all.back().comparable = false, all.back().tile = tile;
+      }
+    }
+    measure(all);
+  }
+
+  void sides() {
+    std::vector<Setting> all;
+    for (int side = o_.side / 8; side <= 4 * o_.side; side *= 2) {
+      all.push_back(setting("side", std::to_string(side)));
+      all.back().side = side;
+    }
+    measure(all);
+  }
+
+  void thread_counts() {
+    std::vector<Setting> all;
+    for (int n = 1; n <= threads(); n = n < threads() ? std::min(2 * n, threads()) : n + 1) {
+      all.push_back(setting("threads", std::to_string(n)));
+      all.back().threads = n, all.back().comparable = n == threads();
+    }
+    measure(all);
+  }
+
+  // The grids stored again, to within a tolerance.
+  void tolerances() {
+    std::size_t samples = 0;
+    for (const Grid& g : db_.grids())
+      samples += std::size_t(g.info.shape.width()) * std::size_t(g.info.shape.height());
+    if (samples > kMostSamples) {
+      report_.notes.push_back("storage tolerances were not measured: more than 100 million samples");
+      return;
+    }
+    for (const Grid& g : db_.grids())
+      write_samples(db_, g.info, folder_.path(std::to_string(g.info.id.value) + ".tif"), {});
+    std::vector<Database> stored;
+    for (const double tolerance : kTolerances) stored.push_back(store_again(tolerance));
+    std::vector<Setting> all;
+    for (std::size_t k = 0; k < stored.size(); ++k) {
+      all.push_back(setting("tolerance", fmt::format("{:g}", kTolerances[k])));
+      all.back().db = &stored[k], all.back().comparable = false;
+    }
+    measure(all);
+  }
+
+  Database store_again(double tolerance) const {
+    const std::string path = folder_.path(fmt::format("tolerance-{:g}.pwk", tolerance));
+    Database made = Database::open_or_create(path, db_.crs(), common_.memory);
+    for (const Grid& g : db_.grids()) {
+      const std::string file = folder_.path(std::to_string(g.info.id.value) + ".tif");
+      made.import(RasterSource::open(file, {.accuracy = g.info.accuracy}, db_.crs()),
+                  {.name = g.info.name, .memory = common_.memory, .tolerance = tolerance});
+    }
+    return Database::open(path, memory_);
+  }
+
+  // Rows of the uniform grid: each level over each window at each side that the knobs have.
+  void uniform_grid() {
+    std::vector<int> sides;
+    for (int side = o_.side / 8; side <= 4 * o_.side; side *= 2) sides.push_back(side);
+    for (const int side : sides) grid_levels(fmt::format("uniform_{}", side), "m", extent_, {}, side);
+    if (window_.xmin < window_.xmax) grid_levels("uniform_view", "px", window_, scale_, o_.side);
+  }
+  void grid_levels(const std::string& knob, const std::string& unit, const Extent& window,
+                   std::span<const double> scale, int side) {
+    for (int level = 0; level < grid_->levels(); ++level) {
+      CostRow row{.knob = knob, .value = fmt::format("1:{}", grid_->factor(level)), .unit = unit};
+      row.error = grid_->error(level, scale), row.samples = double(side) * side;
+      row.bytes = grid_->bytes(level), row.file_bytes = grid_->file_bytes();
+      for (int r = 0; r <= o_.runs; ++r) {
+        const double ms = grid_->read(level, window, side);
+        if (r > 0) row.ms.fetch.push_back(ms);
+      }
+      report_.rows.push_back(std::move(row));
+    }
+  }
+
+  const CostOptions& o_;
+  const Common& common_;
+  WorkFolder folder_;
+  Database db_;
+  ProgressBar bar_;
+  Extent extent_{}, window_{};  // window_: of the view
+  std::uint64_t memory_ = 0;
+  std::unique_ptr<CheckPoints> points_;
+  std::unique_ptr<UniformGrid> grid_;
+  std::shared_ptr<Device> device_;
+  std::vector<double> ladder_, scale_;
+  CostReport report_;
+};
+
+}  // namespace
+
+CostReport measure_cost(const CostOptions& options, const Common& common) {
+  CostReport report = Bench(options, common).run();
+  find_knee(report), find_bargains(report), fit_model(report);
+  return report;
+}
+
+}  // namespace patchwork::cli

@@ -1,0 +1,100 @@
+// patchwork cost: what accuracy costs in time, for this database on this machine.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "db/error.h"
+#include "tools/bench/process.h"
+#include "tools/cost/cost.h"
+
+namespace patchwork::cli {
+
+namespace {
+
+Json json_of(const CostReport& c, const std::vector<std::string>& files) {
+  const CostRow& knee = c.rows[c.knee];
+  Json j{{"rows", c.rows.size()},
+         {"points", c.points},
+         {"beyond", c.beyond()},
+         {"files", files},
+         {"notes", c.notes},
+         {"machine", c.machine},
+         {"content_hash", c.content_hash},
+         {"knee", {{"error", *knee.asked}, {"bound", *knee.bound}, {"ms", median(knee.ms.total())}}},
+         {"model", {{"r_squared", c.r_squared}, {"worst_ratio", c.worst_ratio}}},
+         {"budgets", Json::array()}};
+  for (const Bargain& b : c.bargains) {
+    Json one{{"ms", b.ms},  {"what", b.what},  {"error", {}},
+             {"bound", {}}, {"error_max", {}}, {"patches", {}}};
+    if (b.row) {
+      const CostRow& r = c.rows[*b.row];
+      one["error"] = *r.asked, one["bound"] = *r.bound, one["error_max"] = r.error.max;
+      one["patches"] = r.patches;
+    }
+    j["budgets"].push_back(std::move(one));
+  }
+  return j;
+}
+
+void print_text(const CostReport& c, const std::string& folder) {
+  const CostRow& knee = c.rows[c.knee];
+  fmt::print(
+      "{} settings; the knee is at an error of {} m ({} ms); the model explains {:.1f} % of the time\n",
+      c.rows.size(), figure(*knee.bound), figure(median(knee.ms.total())), 100 * c.r_squared);
+  for (const Bargain& b : c.bargains)
+    fmt::print("  {:>2g} ms, {}: {}\n", b.ms, b.what,
+               b.row ? fmt::format("within {} m (measured {} m)", figure(*c.rows[*b.row].bound),
+                                   figure(c.rows[*b.row].error.max))
+                     : "not even the coarsest");
+  fmt::print("see {}\n", (std::filesystem::path(folder) / "index.html").string());
+}
+
+// The database may lie where nobody may write: then the model is not kept.
+void keep_model(const CostReport& c, const std::string& path, const Common& common) {
+  try {
+    Database db = Database::open_existing(path, common.memory);
+    save_model(db, c.model);
+  } catch (const Error& e) {
+    note(common, fmt::format("the model was not kept in the database: {}", e.what()));
+  }
+}
+
+void run(const CostOptions& o, const Common& common) {
+  run_process({"gnuplot", "--version"}, "gnuplot-nox");  // before minutes of work, not after
+  std::error_code failed;
+  std::filesystem::create_directories(o.folder, failed);
+  if (failed) throw Error(o.folder, "it cannot be made", failed.message());
+  const CostReport report = measure_cost(o, common);
+  const std::vector<std::string> files = write_cost(report, o.folder);
+  keep_model(report, o.database, common);
+  for (const std::string& n : report.notes) note(common, "note: " + n);
+  if (common.json)
+    print(json_of(report, files));
+  else if (!common.quiet)
+    print_text(report, o.folder);
+  if (report.beyond() > 0)
+    throw Error(o.database, fmt::format("{} measured errors are beyond their bounds", report.beyond()),
+                "some grid is less accurate than --accuracy said; compare them with: import --dry-run");
+}
+
+}  // namespace
+
+void add_cost(CLI::App& app, Common& common) {
+  auto o = std::make_shared<CostOptions>();
+  CLI::App* v = verb(app, common, "cost", "what accuracy costs in time: CSV, JSON, plots and one page");
+  v->add_option("DB", o->database, "the database; a model of the costs is kept in it")->required();
+  v->add_option("OUTDIR", o->folder, "where cost.csv, cost.json, the plots and index.html go")->required();
+  v->add_option("--extent", o->extent, "xmin ymin xmax ymax of the picture, in the database's CRS")
+      ->expected(4);
+  auto* eye = v->add_option("--eye", o->eye, "where the view is seen from: x y z, metres")->expected(3);
+  v->add_option("--look", o->look, "the point in the middle of the view: x y z")->expected(3)->needs(eye);
+  eye->needs("--look");
+  v->add_option("--fov", o->fov, "vertical field of view, degrees");
+  v->add_option("--size", o->side, "heights along each side of the picture")->check(CLI::Range(64, 4096));
+  v->add_option("--runs", o->runs, "measured runs of each setting")->check(CLI::Range(1, 1000));
+  v->add_option("--points", o->points, "at which errors are measured")->check(CLI::Range(100, 100'000'000));
+  v->add_flag("--json", common.json, "one JSON document on stdout");
+  v->callback([o, &common] { run(*o, common); });
+}
+
+}  // namespace patchwork::cli

@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
   cli::add_sample(app, common);
   cli::add_resample(app, common);
   cli::add_cost(app, common);
+  cli::add_render(app, common);
   cli::add_bench(app, common);
 
   for (CLI::App* v : app.get_subcommands({}))

@@ -28,6 +28,15 @@ std::uint32_t memory_type(const Device::Impl& device, std::uint32_t allowed, Whe
 
 }  // namespace
 
+OwnedMemory allocate(const Device::Impl& device, const VkMemoryRequirements& needs, Where where) {
+  VkMemoryAllocateInfo allocate{};
+  allocate.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, allocate.allocationSize = needs.size;
+  allocate.memoryTypeIndex = memory_type(device, needs.memoryTypeBits, where);
+  VkDeviceMemory memory = VK_NULL_HANDLE;
+  device.check(vkAllocateMemory(device.get(), &allocate, nullptr, &memory), "taking memory");
+  return OwnedMemory(device.get(), memory);
+}
+
 // Every buffer can be copied from and to; what is mapped stays so.
 Buffer::Buffer(const Device::Impl& device, VkDeviceSize bytes, VkBufferUsageFlags usage, Where where)
     : bytes_(std::max<VkDeviceSize>(bytes, 64)) {
@@ -39,16 +48,11 @@ Buffer::Buffer(const Device::Impl& device, VkDeviceSize bytes, VkBufferUsageFlag
   buffer_ = OwnedBuffer(device.get(), buffer);
   VkMemoryRequirements needs{};
   vkGetBufferMemoryRequirements(device.get(), buffer, &needs);
-  VkMemoryAllocateInfo allocate{};
-  allocate.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, allocate.allocationSize = needs.size;
-  allocate.memoryTypeIndex = memory_type(device, needs.memoryTypeBits, where);
-  VkDeviceMemory memory = VK_NULL_HANDLE;
-  device.check(vkAllocateMemory(device.get(), &allocate, nullptr, &memory), "taking memory");
-  memory_ = OwnedMemory(device.get(), memory);
-  device.check(vkBindBufferMemory(device.get(), buffer, memory, 0), "binding memory");
+  memory_ = allocate(device, needs, where);
+  device.check(vkBindBufferMemory(device.get(), buffer, memory_.get(), 0), "binding memory");
   if (where == Where::card) return;
   void* mapped = nullptr;
-  device.check(vkMapMemory(device.get(), memory, 0, VK_WHOLE_SIZE, 0, &mapped), "mapping memory");
+  device.check(vkMapMemory(device.get(), memory_.get(), 0, VK_WHOLE_SIZE, 0, &mapped), "mapping memory");
   mapped_ = static_cast<std::byte*>(mapped);
 }
 

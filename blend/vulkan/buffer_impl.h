@@ -15,6 +15,9 @@ enum class Where {
   readback  ///< mapped, read by the host
 };
 
+/// Throws Error: out of memory, no memory of that kind.
+OwnedMemory allocate(const Device::Impl& device, const VkMemoryRequirements& needs, Where where);
+
 /// A buffer with memory of its own. There are some tens of them, all long-lived: nothing is gained by sharing
 /// memory between them.
 class Buffer {

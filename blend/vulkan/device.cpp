@@ -50,13 +50,18 @@ bool has_validation() {
                      [](const auto& l) { return std::strcmp(l.layerName, kValidation) == 0; });
 }
 
-void make_instance(Device::Impl& impl, bool validation) {
+std::vector<const char*> pointers(const std::vector<std::string>& names) {
+  std::vector<const char*> all;
+  for (const std::string& n : names) all.push_back(n.c_str());
+  return all;
+}
+
+void make_instance(Device::Impl& impl, bool validation, std::vector<const char*> extensions) {
   if (validation && !has_validation())
     throw Error("Vulkan", "its validation layer is missing", "install vulkan-validationlayers");
   VkApplicationInfo app{};
   app.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
   app.pApplicationName = "patchwork", app.apiVersion = kVersion;
-  const char* debug = VK_EXT_DEBUG_UTILS_EXTENSION_NAME;
   VkDebugUtilsMessengerCreateInfoEXT listener = messenger_info(impl);
   // Hazards between dispatches and copies are found by the layer's synchronization checks alone.
   const VkValidationFeatureEnableEXT more = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
@@ -68,8 +73,10 @@ void make_instance(Device::Impl& impl, bool validation) {
   if (validation) {
     info.pNext = &features;
     info.enabledLayerCount = 1, info.ppEnabledLayerNames = &kValidation;
-    info.enabledExtensionCount = 1, info.ppEnabledExtensionNames = &debug;
+    extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
   }
+  info.enabledExtensionCount = std::uint32_t(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   VkInstance instance = VK_NULL_HANDLE;
   impl.check(vkCreateInstance(&info, nullptr, &instance), "starting Vulkan");
   impl.instance = vk::Instance({}, instance);
@@ -82,15 +89,36 @@ void make_instance(Device::Impl& impl, bool validation) {
   impl.messenger = vk::Messenger(instance, messenger);
 }
 
-// The first family of queues that runs compute shaders and can say how long they took.
+// The first family of queues that runs compute shaders and can say how long they took; better one that draws.
 std::optional<std::uint32_t> computing_family(VkPhysicalDevice device) {
   std::uint32_t n = 0;
   vkGetPhysicalDeviceQueueFamilyProperties(device, &n, nullptr);
   std::vector<VkQueueFamilyProperties> families(n);
   vkGetPhysicalDeviceQueueFamilyProperties(device, &n, families.data());
-  for (std::uint32_t f = 0; f < n; ++f)
-    if (families[f].queueFlags & VK_QUEUE_COMPUTE_BIT && families[f].timestampValidBits > 0) return f;
+  for (const VkQueueFlags wanted : {VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT, VK_QUEUE_COMPUTE_BIT | 0})
+    for (std::uint32_t f = 0; f < n; ++f)
+      if ((families[f].queueFlags & wanted) == wanted && families[f].timestampValidBits > 0) return f;
   return {};
+}
+
+// What drawing needs beyond computing, where the device has it; `missing` says what it has not.
+VkPhysicalDeviceFeatures drawing_features(VkPhysicalDevice device, std::uint32_t family,
+                                          std::string& missing) {
+  std::uint32_t n = 0;
+  vkGetPhysicalDeviceQueueFamilyProperties(device, &n, nullptr);
+  std::vector<VkQueueFamilyProperties> families(n);
+  vkGetPhysicalDeviceQueueFamilyProperties(device, &n, families.data());
+  VkPhysicalDeviceFeatures has{}, use{};
+  vkGetPhysicalDeviceFeatures(device, &has);
+  if (!(families[family].queueFlags & VK_QUEUE_GRAPHICS_BIT)) missing = "its queue does not draw";
+  if (!has.tessellationShader) missing = "it does not tessellate";
+  if (!has.multiDrawIndirect || !has.drawIndirectFirstInstance) missing = "it has no indirect draws";
+  if (!has.shaderStorageImageExtendedFormats) missing = "its shaders write no images of two channels";
+  use.tessellationShader = has.tessellationShader, use.multiDrawIndirect = has.multiDrawIndirect;
+  use.drawIndirectFirstInstance = has.drawIndirectFirstInstance;
+  use.shaderStorageImageExtendedFormats = has.shaderStorageImageExtendedFormats;
+  use.pipelineStatisticsQuery = has.pipelineStatisticsQuery, use.fillModeNonSolid = has.fillModeNonSolid;
+  return use;
 }
 
 struct Candidate {
@@ -169,16 +197,18 @@ const Candidate& choose(const std::vector<Candidate>& all, const std::string& ch
 }
 
 // One queue does everything: copies and dispatches of one evaluator depend on each other anyway.
-void make_device(Device::Impl& impl) {
+void make_device(Device::Impl& impl, const std::vector<const char*>& extensions) {
   const float priority = 1;
   VkDeviceQueueCreateInfo queue{};
   queue.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
   queue.queueFamilyIndex = impl.family, queue.queueCount = 1, queue.pQueuePriorities = &priority;
-  VkPhysicalDeviceFeatures features{};
-  features.shaderFloat64 = VK_TRUE;
+  impl.features = drawing_features(impl.physical, impl.family, impl.cannot_draw);
+  impl.features.shaderFloat64 = VK_TRUE;
   VkDeviceCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
-  info.queueCreateInfoCount = 1, info.pQueueCreateInfos = &queue, info.pEnabledFeatures = &features;
+  info.queueCreateInfoCount = 1, info.pQueueCreateInfos = &queue, info.pEnabledFeatures = &impl.features;
+  info.enabledExtensionCount = std::uint32_t(extensions.size());
+  info.ppEnabledExtensionNames = extensions.data();
   VkDevice device = VK_NULL_HANDLE;
   impl.check(vkCreateDevice(impl.physical, &info, nullptr, &device), "opening the device");
   impl.device = vk::LogicalDevice({}, device);
@@ -218,14 +248,14 @@ Device::~Device() {
 
 std::shared_ptr<Device> Device::open(const DeviceOptions& options) {
   auto impl = std::make_unique<Impl>();
-  make_instance(*impl, options.validation);
+  make_instance(*impl, options.validation, pointers(options.instance_extensions));
   const char* wish = std::getenv("PATCHWORK_DEVICE");
   const std::vector<Candidate> all = candidates_of(*impl);
   const Candidate& c = choose(all, !options.choice.empty() ? options.choice : wish ? wish : "");
   impl->physical = c.device, impl->properties = c.properties, impl->name = c.name();
   impl->family = *computing_family(c.device);
   vkGetPhysicalDeviceMemoryProperties(c.device, &impl->memory);
-  make_device(*impl);
+  make_device(*impl, pointers(options.device_extensions));
   return std::shared_ptr<Device>(new Device(std::move(impl)));
 }
 

@@ -12,6 +12,7 @@ struct DeviceOptions {
   bool validation = false;  ///< the Khronos layer watches every call; see Device::messages
   std::string choice =
       {};  ///< a part of the device's name or its number; empty: PATCHWORK_DEVICE, else the best
+  std::vector<std::string> instance_extensions = {}, device_extensions = {};  ///< what a window needs
 };
 
 /// One device with one queue. What is made from it keeps it alive. Not safe for concurrent use.

@@ -24,6 +24,8 @@ struct Device::Impl {
   VkPhysicalDevice physical = VK_NULL_HANDLE;
   VkPhysicalDeviceProperties properties{};
   VkPhysicalDeviceMemoryProperties memory{};
+  VkPhysicalDeviceFeatures features{};  // that are switched on
+  std::string cannot_draw;              // why it only computes; empty: it draws
   std::uint32_t family = 0;
   vk::LogicalDevice device;
   VkQueue queue = VK_NULL_HANDLE;

@@ -69,7 +69,7 @@ void Frame::grow(const Work& work) {
                          Where::card);
   changed |= make_larger(device_, work_, bins.tiles.size() * work.push.blocks * work.push.blocks * 12,
                          storage, Where::card);
-  changed |= make_larger(device_, results_, results, storage, Where::card);
+  changed |= make_larger(device_, results_, results, storage | texel, Where::card);
   if (entries_.bytes() < entries || !entries_.get()) entry_texels_ = OwnedView();
   if (make_larger(device_, entries_, entries, texel, Where::card))
     entry_texels_ = texels(device_, entries_, VK_FORMAT_R32G32B32A32_SFLOAT), changed = true;

@@ -57,6 +57,11 @@ using OwnedShader = Owned<VkShaderModule, vkDestroyShaderModule>;
 using OwnedSetLayout = Owned<VkDescriptorSetLayout, vkDestroyDescriptorSetLayout>;
 using OwnedLayout = Owned<VkPipelineLayout, vkDestroyPipelineLayout>;
 using OwnedSets = Owned<VkDescriptorPool, vkDestroyDescriptorPool>;
+using OwnedImage = Owned<VkImage, vkDestroyImage>;
+using OwnedImageView = Owned<VkImageView, vkDestroyImageView>;
+using OwnedSampler = Owned<VkSampler, vkDestroySampler>;
+using OwnedRenderPass = Owned<VkRenderPass, vkDestroyRenderPass>;
+using OwnedFramebuffer = Owned<VkFramebuffer, vkDestroyFramebuffer>;
 using OwnedPipeline = Owned<VkPipeline, vkDestroyPipeline>;
 
 }  // namespace patchwork::vk

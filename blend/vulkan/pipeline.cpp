@@ -6,11 +6,11 @@ namespace patchwork::vk {
 
 namespace {
 
-// All bindings are seen by compute shaders alone, one descriptor each.
-OwnedSetLayout make_set_layout(const Device::Impl& device, std::span<const VkDescriptorType> types) {
+// One descriptor a binding.
+OwnedSetLayout make_set_layout(const Device::Impl& device, std::span<const VkDescriptorType> types,
+                               VkShaderStageFlags stages) {
   std::vector<VkDescriptorSetLayoutBinding> bindings;
-  for (std::uint32_t b = 0; b < types.size(); ++b)
-    bindings.push_back({b, types[b], 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr});
+  for (std::uint32_t b = 0; b < types.size(); ++b) bindings.push_back({b, types[b], 1, stages, nullptr});
   VkDescriptorSetLayoutCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
   info.bindingCount = std::uint32_t(bindings.size()), info.pBindings = bindings.data();
@@ -19,28 +19,31 @@ OwnedSetLayout make_set_layout(const Device::Impl& device, std::span<const VkDes
   return OwnedSetLayout(device.get(), layout);
 }
 
-OwnedLayout make_layout(const Device::Impl& device, VkDescriptorSetLayout set, std::uint32_t push_bytes) {
-  const VkPushConstantRange push{VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes};
+OwnedLayout make_layout(const Device::Impl& device, VkDescriptorSetLayout set, std::uint32_t push_bytes,
+                        VkShaderStageFlags stages) {
+  const VkPushConstantRange push{stages, 0, push_bytes};
   VkPipelineLayoutCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
   info.setLayoutCount = 1, info.pSetLayouts = &set;
-  info.pushConstantRangeCount = 1, info.pPushConstantRanges = &push;
+  info.pushConstantRangeCount = push_bytes > 0, info.pPushConstantRanges = &push;
   VkPipelineLayout layout = VK_NULL_HANDLE;
   device.check(vkCreatePipelineLayout(device.get(), &info, nullptr, &layout), "describing a pipeline");
   return OwnedLayout(device.get(), layout);
 }
 
-// Room for one set with any mixture of the two types.
-OwnedSets make_pool(const Device::Impl& device, std::uint32_t bindings) {
-  const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, bindings},
-                                        {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, bindings}};
+// Room for one set.
+OwnedSets make_pool(const Device::Impl& device, std::span<const VkDescriptorType> types) {
+  std::vector<VkDescriptorPoolSize> sizes;
+  for (const VkDescriptorType t : types) sizes.push_back({t, 1});
   VkDescriptorPoolCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO, info.maxSets = 1;
-  info.poolSizeCount = 2, info.pPoolSizes = sizes;
+  info.poolSizeCount = std::uint32_t(sizes.size()), info.pPoolSizes = sizes.data();
   VkDescriptorPool pool = VK_NULL_HANDLE;
   device.check(vkCreateDescriptorPool(device.get(), &info, nullptr, &pool), "making a descriptor pool");
   return OwnedSets(device.get(), pool);
 }
+
+}  // namespace
 
 OwnedShader make_shader(const Device::Impl& device, std::span<const std::uint32_t> code) {
   VkShaderModuleCreateInfo info{};
@@ -51,17 +54,15 @@ OwnedShader make_shader(const Device::Impl& device, std::span<const std::uint32_
   return OwnedShader(device.get(), module);
 }
 
-}  // namespace
-
 Bindings::Bindings(const Device::Impl& device, std::span<const VkDescriptorType> types,
-                   std::uint32_t push_bytes)
+                   std::uint32_t push_bytes, VkShaderStageFlags stages)
     : device_(device),
       types_(types.begin(), types.end()),
-      set_layout_(make_set_layout(device, types)),
-      layout_(make_layout(device, set_layout_.get(), push_bytes)) {}
+      set_layout_(make_set_layout(device, types, stages)),
+      layout_(make_layout(device, set_layout_.get(), push_bytes, stages)) {}
 
 OwnedSets Bindings::make_set(VkDescriptorSet& set) const {
-  OwnedSets pool = make_pool(device_, std::uint32_t(types_.size()));
+  OwnedSets pool = make_pool(device_, types_);
   const VkDescriptorSetLayout layout = set_layout_.get();
   VkDescriptorSetAllocateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
@@ -70,24 +71,34 @@ OwnedSets Bindings::make_set(VkDescriptorSet& set) const {
   return pool;
 }
 
+void Bindings::write(VkDescriptorSet set, std::uint32_t binding, VkWriteDescriptorSet what) const {
+  what.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+  what.dstSet = set, what.dstBinding = binding, what.descriptorCount = 1;
+  what.descriptorType = types_[binding];
+  vkUpdateDescriptorSets(device_.get(), 1, &what, 0, nullptr);
+}
+
 void Bindings::bind(VkDescriptorSet set, std::uint32_t binding, const Buffer& buffer) const {
-  assert(types_[binding] == VK_DESCRIPTOR_TYPE_STORAGE_BUFFER);
   const VkDescriptorBufferInfo info{buffer.get(), 0, VK_WHOLE_SIZE};
-  VkWriteDescriptorSet write{};
-  write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-  write.dstSet = set, write.dstBinding = binding, write.descriptorCount = 1;
-  write.descriptorType = types_[binding], write.pBufferInfo = &info;
-  vkUpdateDescriptorSets(device_.get(), 1, &write, 0, nullptr);
+  VkWriteDescriptorSet what{};
+  what.pBufferInfo = &info;
+  write(set, binding, what);
 }
 
 void Bindings::bind(VkDescriptorSet set, std::uint32_t binding, const OwnedView& view) const {
   assert(types_[binding] == VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER);
   const VkBufferView texels = view.get();
-  VkWriteDescriptorSet write{};
-  write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-  write.dstSet = set, write.dstBinding = binding, write.descriptorCount = 1;
-  write.descriptorType = types_[binding], write.pTexelBufferView = &texels;
-  vkUpdateDescriptorSets(device_.get(), 1, &write, 0, nullptr);
+  VkWriteDescriptorSet what{};
+  what.pTexelBufferView = &texels;
+  write(set, binding, what);
+}
+
+void Bindings::bind(VkDescriptorSet set, std::uint32_t binding, VkSampler sampler, VkImageView view,
+                    VkImageLayout layout) const {
+  const VkDescriptorImageInfo info{sampler, view, layout};
+  VkWriteDescriptorSet what{};
+  what.pImageInfo = &info;
+  write(set, binding, what);
 }
 
 // The module is only needed until the pipeline is made. Booleans are specialized as 32-bit words like

@@ -6,16 +6,16 @@ namespace {
 
 // Made by glslc in the build tree, numbers alone (blend/CMakeLists.txt).
 constexpr std::uint32_t kClassify[] = {
-#include "classify.spv.inc"
+#include "classify.comp.inc"
 };
 constexpr std::uint32_t kBlend[] = {
-#include "blend.spv.inc"
+#include "blend.comp.inc"
 };
 constexpr std::uint32_t kBlockErrors[] = {
-#include "block_errors.spv.inc"
+#include "block_errors.comp.inc"
 };
 constexpr std::uint32_t kExact[] = {
-#include "exact.spv.inc"
+#include "exact.comp.inc"
 };
 
 }  // namespace

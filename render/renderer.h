@@ -1,0 +1,68 @@
+// From a camera to a picture: selects tiles, makes those that are missing, draws.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "blend/blend.h"
+#include "blend/vulkan/device.h"
+#include "render/camera.h"
+#include "render/picture.h"
+#include "render/tile_cache.h"
+
+namespace patchwork {
+
+struct RendererOptions {
+  int width = 1280, height = 720;               ///< pixels
+  double pixel_error = 1;                       ///< pixels
+  int smoothness = 1;                           ///< k
+  std::size_t memory = std::size_t{512} << 20;  ///< bytes on the card: half for tiles, half for patches
+  TilePolicy policy = TilePolicy::lru;
+  Color background{0xbf, 0xd4, 0xe8};
+  bool published = false;  ///< tessellation as published, without the guarantee (vulkan/factors.comp)
+  double curvature = 0;  ///< metres by which the earth drops away, per square metre of distance in the plane
+};
+
+/// What a frame did and reached. Milliseconds.
+struct FrameStats {
+  double select_ms = 0, extract_ms = 0, send_ms = 0, blend_ms = 0, finish_ms = 0;  ///< on the host
+  double factors_ms = 0, draw_ms = 0;                                              ///< on the card
+  double total_ms = 0;
+  std::size_t tiles_drawn = 0, tiles_made = 0, tiles_wanted = 0;  ///< wanted: still missing
+  std::size_t patches_sent = 0, bytes_up = 0;
+  std::size_t dispatches = 0, draws = 0;  ///< of tiles made: their own; draws in an indirect call
+  std::uint64_t triangles = 0;            ///< 0 where the device does not count
+  double pixels_asked = 0, pixels_reached = 0;
+  double bound_max = 0;  ///< metres: of all heights drawn
+  BlendCounts blended;   ///< of the tiles made
+};
+
+/// One picture at a time. Not safe for concurrent use.
+class Renderer {
+ public:
+  static constexpr double kNear = 0.1;  ///< metres
+
+  /// REQUIRES: `db` outlives it. Throws Error: a device that does not draw, no memory, nothing to draw.
+  Renderer(std::shared_ptr<Device> device, const Database& db, const RendererOptions& options);
+  ~Renderer();
+
+  /// Waits until all that the picture needs is there. A frame whose input is that of the one before is not
+  /// drawn again. Throws Error: the device's memory, damaged payloads.
+  FrameStats draw(const Camera& camera);
+  /// What was drawn last, read from the card when asked for.
+  Image picture() const;
+  /// Metres along the ray through each pixel's centre, row-major; NaN where there is sky.
+  std::vector<float> depth() const;
+
+  /// After the database moved to another state: tiles that `changed` touches are made anew.
+  void restate(const std::vector<Extent>& changed);
+  const TileCache& cache() const;
+  const TileLattice& lattice() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace patchwork

@@ -1,0 +1,138 @@
+#include "render/tile_selection.h"
+
+#include <algorithm>
+
+namespace patchwork {
+
+namespace {
+
+// Splits the worst leaf until all keep to the pixel error; a leaf is only split if all of its children are
+// there, and after its neighbours that are larger than it.
+class Selector {
+ public:
+  Selector(const TileLattice& lattice, const Frustum& frustum, const SelectionOptions& options,
+           TileCache& cache, Selection& out)
+      : lattice_(lattice), frustum_(frustum), options_(options), cache_(cache), out_(out) {
+    out_.tiles.clear(), out_.leaves.clear(), out_.drawn.clear(), out_.wanted.clear(), out_.pixels = 0;
+  }
+
+  void run() {
+    const TileCache::Node* root = cache_.find(lattice_.root());
+    if (!root || (!root->drawable() && !root->empty)) {
+      want(lattice_.root(), 1e9);
+      return;
+    }
+    add(lattice_.root(), *root);
+    while (!queue_.empty()) {
+      std::pop_heap(queue_.begin(), queue_.end(), worse());
+      const std::uint32_t worst = queue_.back();
+      queue_.pop_back();
+      const TileKey key = out_.leaves[worst].key;
+      if (out_.tiles.at(key) == worst) try_split(worst);
+    }
+    finish();
+  }
+
+ private:
+  struct Less {
+    const std::vector<Selection::Leaf>& leaves;
+    bool operator()(std::uint32_t a, std::uint32_t b) const { return leaves[a].pixels < leaves[b].pixels; }
+  };
+  Less worse() const { return {out_.leaves}; }
+
+  void want(const TileKey& key, double pixels) { out_.wanted.push_back({key, pixels}); }
+
+  void add(const TileKey& key, const TileCache::Node& node) {
+    const Box3 box{lattice_.bounds(key), node.facts.lowest, node.facts.highest};
+    Selection::Leaf leaf{key};
+    leaf.drawn = !node.empty && frustum_.sees(box);
+    if (leaf.drawn)
+      leaf.pixels = node.facts.error > 0 ? node.facts.error * frustum_.pixels_per_metre(box) : 0;
+    const auto place = std::uint32_t(out_.leaves.size());
+    out_.leaves.push_back(leaf);
+    out_.tiles[key] = place;
+    if (!node.empty) cache_.use(key, leaf.pixels);
+    if (!leaf.drawn) return;
+    ++drawn_;
+    if (node.stale) want(key, std::max(leaf.pixels, options_.pixel_error));
+    if (leaf.pixels <= options_.pixel_error || key.level == 0) return;
+    queue_.push_back(place);
+    std::push_heap(queue_.begin(), queue_.end(), worse());
+  }
+
+  // Is `key` a leaf, or split? If a larger leaf stands there instead, it is split first.
+  bool make_room(const TileKey& key) {
+    if (!lattice_.contains(key) || out_.tiles.contains(key)) return true;
+    const auto above = out_.tiles.find(key.parent());
+    if (above == out_.tiles.end() || above->second == Selection::kSplit) return true;  // in what is not drawn
+    return !out_.leaves[above->second].drawn || try_split(above->second);
+  }
+
+  bool children_are_there(const TileKey& key, double pixels) {
+    bool all = true;
+    for (int c = 0; c < 4; ++c) {
+      const TileKey child = key.child(c);
+      const TileCache::Node* n = cache_.find(child);
+      if (n && (n->empty || n->drawable())) {
+        if (!n->empty) cache_.use(child, 0);
+        continue;
+      }
+      want(child, pixels), all = false;
+    }
+    return all;
+  }
+
+  bool try_split(std::uint32_t place) {
+    const TileKey key = out_.leaves[place].key;
+    if (key.level == 0 || drawn_ + 3 > options_.most_tiles) return false;
+    if (!children_are_there(key, out_.leaves[place].pixels)) return false;
+    for (int s = 0; s < 4; ++s)
+      if (!make_room(key.beside(s))) return false;
+    out_.leaves[place].drawn = false, --drawn_;
+    out_.tiles[key] = Selection::kSplit;
+    for (int c = 0; c < 4; ++c) add(key.child(c), *cache_.find(key.child(c)));
+    return true;
+  }
+
+  void finish() {
+    for (std::uint32_t k = 0; k < out_.leaves.size(); ++k)
+      if (out_.leaves[k].drawn) {
+        out_.drawn.push_back(k);
+        out_.pixels = std::max(out_.pixels, out_.leaves[k].pixels);
+      }
+    std::sort(out_.wanted.begin(), out_.wanted.end(), [](const auto& a, const auto& b) {
+      return a.pixels != b.pixels ? a.pixels > b.pixels : a.key < b.key;
+    });
+    const auto same = [](const auto& a, const auto& b) { return a.key == b.key; };
+    out_.wanted.erase(std::unique(out_.wanted.begin(), out_.wanted.end(), same), out_.wanted.end());
+  }
+
+  const TileLattice& lattice_;
+  const Frustum& frustum_;
+  const SelectionOptions& options_;
+  TileCache& cache_;
+  Selection& out_;
+  std::vector<std::uint32_t> queue_;  // heap of places
+  std::size_t drawn_ = 0;
+};
+
+}  // namespace
+
+// Down to the corner that lies towards (x, y) (0: smaller, 1: larger) where the tile is split, up where a
+// larger one holds it.
+const Selection::Leaf* Selection::leaf_at(TileKey key, int towards_x, int towards_y) const {
+  auto at = tiles.find(key);
+  while (at == tiles.end()) {
+    if (key.level > TileLattice::kMaxLevels) return nullptr;
+    key = key.parent(), at = tiles.find(key);
+  }
+  while (at->second == kSplit) at = tiles.find(at->first.child(towards_x + 2 * towards_y));
+  return &leaves[at->second];
+}
+
+void select_tiles(const TileLattice& lattice, const Frustum& frustum, const SelectionOptions& options,
+                  TileCache& cache, Selection& selection) {
+  Selector(lattice, frustum, options, cache, selection).run();
+}
+
+}  // namespace patchwork

@@ -1,0 +1,44 @@
+// Which tiles a frame draws: a restricted quadtree that keeps to the pixel error as far as tiles are there.
+#pragma once
+
+#include <unordered_map>
+#include <vector>
+
+#include "render/tile_cache.h"
+
+namespace patchwork {
+
+struct SelectionOptions {
+  double pixel_error = 1;         ///< pixels
+  std::size_t most_tiles = 4096;  ///< that are drawn; the largest errors are refined first
+};
+
+/// Tiles that cover what is seen without overlap; neighbours that share an edge differ by at most one level.
+struct Selection {
+  struct Leaf {
+    TileKey key;
+    double pixels = 0;   ///< the largest error of its mesh on the screen
+    bool drawn = false;  ///< else out of sight, or without data
+  };
+  /// A tile that is missing, or stale, and how much it matters: pixels.
+  struct Wanted {
+    TileKey key;
+    double pixels;
+  };
+  std::unordered_map<TileKey, std::uint32_t> tiles;  ///< places in `leaves`; kSplit for what is split
+  std::vector<Leaf> leaves;                          ///< those that were split have drawn == false
+  std::vector<std::uint32_t> drawn;                  ///< places in `leaves`, the largest error first
+  std::vector<Wanted> wanted;                        ///< the most wanted first
+  double pixels = 0;                                 ///< error reached: largest of all that is drawn
+  static constexpr std::uint32_t kSplit = UINT32_MAX;
+
+  /// The place of the leaf that holds tile `key` of any level on the side of (x, y) nearest to it, see .cpp.
+  const Leaf* leaf_at(TileKey key, int towards_x, int towards_y) const;
+};
+
+/// Starts from the root, whose absence makes it the only one wanted. Marks what it uses in the cache.
+/// `selection` is overwritten; its memory is kept.
+void select_tiles(const TileLattice& lattice, const Frustum& frustum, const SelectionOptions& options,
+                  TileCache& cache, Selection& selection);
+
+}  // namespace patchwork

@@ -1,0 +1,47 @@
+#version 450
+// How many segments each block of 8 x 8 cells of each drawn tile needs along a side so that its mesh keeps to the
+// pixel error: 1, 2, 4 or 8. With the block's errors (tile_finish.comp) and the depth of its nearest point. Bit
+// kOut: the block is out of sight. The published choices (Yusov and Shevtsov, section 5), kept to show what the
+// guarantee costs: the middle of a block instead of its nearest point, and no more than its mesh's own error.
+#extension GL_GOOGLE_include_directive : require
+#include "terrain.glsl"
+
+layout(local_size_x = 64) in;  // the blocks of a tile
+
+layout(binding = 3) uniform samplerBuffer blocks;  // two texels a block: errors by simplification; lowest, highest
+layout(binding = 4) writeonly buffer Factors { uint factors[]; };
+layout(push_constant) uniform Push { uint first; } push;
+
+const uint kOut = 256u;
+
+// The largest of dot(n, corner).
+float largest_along(vec3 n, vec3 low, vec3 high) {
+  return n.x * (n.x > 0 ? high.x : low.x) + n.y * (n.y > 0 ? high.y : low.y) + n.z * (n.z > 0 ? high.z : low.z);
+}
+
+void main() {
+  const int d = int(gl_WorkGroupID.x + push.first), b = int(gl_LocalInvocationID.x);
+  const Draw draw = draw_at(d);
+  const vec4 error = texelFetch(blocks, (draw.slot * 64 + b) * 2);
+  const vec4 range = texelFetch(blocks, (draw.slot * 64 + b) * 2 + 1);
+  const ivec2 at = ivec2(b % kBlocks, b / kBlocks) * (2 * kBlockCells);
+  const vec2 low = vec2(draw.first + at * draw.stride) * frame.eye.w - frame.eye.xy;
+  const vec2 high = low + float(2 * kBlockCells * draw.stride) * frame.eye.w;
+  const vec2 far = max(abs(low), abs(high));
+  vec3 bottom = vec3(low, range.x + frame.eye.z - frame.detail.y * dot(far, far));
+  vec3 top = vec3(high, range.y + frame.eye.z);
+  bool seen = range.x <= range.y;
+  for (int s = 0; s < 4; ++s) seen = seen && largest_along(frame.sides[s].xyz, bottom, top) >= 0;
+  const float depth = -largest_along(-frame.axis.xyz, bottom, top);
+  seen = seen && largest_along(frame.axis.xyz, bottom, top) > 0;
+  const bool published = frame.detail.w != 0;
+  const float nearest = published ? dot(frame.axis.xyz, 0.5 * (bottom + top)) : depth;
+  uint segments = 8;
+  if (nearest > frame.axis.w) {
+    const float allowed = nearest / frame.detail.x - (published ? 0.0 : facts_at(d).x);
+    if (error.w <= allowed) segments = 1;
+    else if (error.z <= allowed) segments = 2;
+    else if (error.y <= allowed) segments = 4;
+  }
+  factors[d * 64 + b] = segments | (seen ? 0u : kOut);
+}

@@ -1,0 +1,54 @@
+// What the shaders of the terrain share: the frame, the drawn tiles, and where a vertex lies. Positions are
+// metres relative to the eye.
+
+layout(binding = 0) uniform FrameBlock {
+  mat4 clip;       // of positions relative to the eye
+  vec4 sides[4];   // inward normals of the picture's sides; all planes go through the eye
+  vec4 axis;       // of the view; w: where the near plane is
+  vec4 eye;        // xy: what the eye's place is past its half cell; z: base of the heights - the eye's; w: half cell
+  vec4 detail;     // x: gamma / pixel error: metres of depth for a metre of error; y: curvature, 1/metre;
+                   // z: gamma; w: 1 for the published choices (factors.comp)
+} frame;
+layout(binding = 1) uniform usamplerBuffer draws;  // TileDraw of tile_seams.h, kDraw texels each
+layout(binding = 2) uniform samplerBuffer heights; // metres over the base; kVertices^2 a slot
+
+const int kCells = 64, kVertices = 65, kBlockCells = 8, kBlocks = 8, kDraw = 10;
+const uint kAlone = 0xffffffffu, kLarger = 0x80000000u, kSecondHalf = 0x40000000u, kFiner = 0x20000000u;
+const uint kNumber = 0x1fffffffu;
+
+struct Draw { ivec2 first; int stride, slot; };
+Draw draw_at(int d) {
+  const uvec4 t = texelFetch(draws, d * kDraw);
+  return Draw(ivec2(t.xy), int(t.z), int(t.w));
+}
+vec4 facts_at(int d) { return uintBitsToFloat(texelFetch(draws, d * kDraw + 9)); }
+
+// The texel of the vertex at position `t` (half cells, 0 to 128) of side s of a tile.
+int seam(int d, int s, int t) {
+  if (t == 0 || t == 2 * kCells) {
+    const int along = t == 0 ? 0 : 1;
+    const int corner = s < 2 ? s + 2 * along : along + 2 * (s - 2);
+    return int(texelFetch(draws, d * kDraw + 5)[corner]);
+  }
+  if (t == kCells) return int(texelFetch(draws, d * kDraw + 6)[s]);
+  const uvec4 side = texelFetch(draws, d * kDraw + 1 + s);
+  const int later = t > kCells ? 1 : 0, past = t - later * kCells;
+  const bool fine = (side.w >> later & 1u) != 0;
+  return int(later == 1 ? side.y : side.x) + (fine ? past : past / 2) * int(side.z);
+}
+
+// The texel of the vertex at half cells `at` of a tile; inside the tile both are even.
+int texel_of(int d, int slot, ivec2 at) {
+  const int last = 2 * kCells;
+  if (at.x == 0) return seam(d, 0, at.y);
+  if (at.x == last) return seam(d, 1, at.y);
+  if (at.y == 0) return seam(d, 2, at.x);
+  if (at.y == last) return seam(d, 3, at.x);
+  return (slot * kVertices + at.y / 2) * kVertices + at.x / 2;
+}
+
+// The same bits for every tile that has the vertex: whole half cells, then one rounding.
+vec3 position_of(Draw draw, ivec2 at, float height) {
+  const vec2 p = vec2(draw.first + at * draw.stride) * frame.eye.w - frame.eye.xy;
+  return vec3(p, height + frame.eye.z - frame.detail.y * dot(p, p));
+}

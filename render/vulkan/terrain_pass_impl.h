@@ -1,0 +1,51 @@
+// Draws tiles: one dispatch says how finely each block is tessellated, one indirect call draws all of them.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+
+#include "blend/vulkan/pipeline_impl.h"
+#include "render/tile_seams.h"
+#include "render/vulkan/target_impl.h"
+#include "render/vulkan/tile_store_impl.h"
+
+namespace patchwork::vk {
+
+/// terrain.glsl: FrameBlock.
+struct FrameBlock {
+  float clip[16], sides[4][4], axis[4], eye[4], detail[4];
+  bool operator==(const FrameBlock&) const = default;
+};
+static_assert(sizeof(FrameBlock) == 176);
+
+class TerrainPass {
+ public:
+  TerrainPass(const Device::Impl& device, const TileStore& store, VkRenderPass pass,
+              std::uint32_t most_tiles);
+
+  /// What is drawn from now on; those with holes come last. REQUIRES: nothing that uses it still runs.
+  void set(const FrameBlock& frame, std::span<const TileDraw> draws);
+  /// Outside of a render pass: factors for what was set.
+  void record_factors(VkCommandBuffer commands) const;
+  /// Inside of one.
+  void record_draws(VkCommandBuffer commands) const;
+
+  std::size_t bytes_set() const { return bytes_set_; }  ///< by the last call
+  std::uint32_t draws() const { return solid_ + holed_; }
+
+ private:
+  void bind_all(const TileStore& store);
+  const Device::Impl& device_;
+  Bindings factor_bindings_, bindings_;
+  OwnedPipeline factors_pipeline_;
+  std::array<OwnedPipeline, 2> pipelines_;  // without and with holes
+  VkDescriptorSet factor_set_ = VK_NULL_HANDLE, set_ = VK_NULL_HANDLE;
+  OwnedSets factor_sets_, sets_;
+  Buffer frame_, draws_, factors_, calls_;
+  OwnedView draw_texels_, factor_texels_;
+  std::uint32_t solid_ = 0, holed_ = 0;
+  std::size_t bytes_set_ = 0;
+};
+
+}  // namespace patchwork::vk

@@ -1,0 +1,262 @@
+#include "render/vulkan/tile_maker.h"
+
+#include <algorithm>
+#include <cassert>
+#include <chrono>
+#include <cmath>
+
+#include "blend/vulkan/vulkan_blend_impl.h"
+#include "query/extract.h"
+#include "render/tile_cut.h"
+#include "render/vulkan/shaders.h"
+#include "render/vulkan/tile_store_impl.h"
+
+namespace patchwork {
+
+namespace {
+
+constexpr int kSide = TileLattice::kSamples + 2;  // with the halo
+constexpr std::uint32_t kMost = 64;               // tiles of a submission
+constexpr std::uint32_t kSummary = 8;             // floats of a tile: tile_finish.comp
+constexpr VkDescriptorType kTypes[] = {
+    VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
+    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_BUFFER};
+constexpr vk::Planes kPlanes{.bound = true, .source = false, .gradient = true};
+
+struct FinishPush {
+  std::uint32_t bound_at, slope_at;
+  float shift, between;
+};
+
+double ms_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+Extent with_halo(const TileLattice& lattice, const TileKey& key) {
+  Extent e = lattice.bounds(key);
+  const double halo = lattice.step(key.level);
+  return {e.xmin - halo, e.ymin - halo, e.xmax + halo, e.ymax + halo};
+}
+
+Tile sampled_tile(const TileLattice& lattice, const TileKey& key) {
+  const int stride = 1 << key.level;
+  return {lattice.first_x(key) - stride, lattice.first_y(key) - stride, stride, kSide, kSide};
+}
+
+// What a tile's patches say of it: do they come of one grid, and what do samples miss between them.
+struct PatchFacts {
+  bool any = false;
+  double accuracy = 0;   // metres: of the grid, where there is only one
+  double unsampled = 0;  // metres
+};
+
+// A patch with cells smaller than the distance of samples may stick out between these by as much as it
+// departs from the patch of its own grid that they do resolve, twice: up here, down there.
+double missed(const Grid& grid, const PatchId& id, double spacing) {
+  const double step = std::min(grid.info.frame.step_i(), grid.info.frame.step_j());
+  int level = id.level(), bx = id.bx(), by = id.by();
+  if (std::ldexp(step, level) >= spacing * 0.99) return 0;
+  double bottom = grid.at(level, bx, by).bottom;
+  while (std::ldexp(step, level) < spacing * 0.99 && level + 1 < grid.info.shape.levels()) {
+    ++level, bx >>= 1, by >>= 1;
+    const PatchRecord p = grid.at(level, bx, by);
+    if (p.exists()) bottom = std::max(bottom, p.bottom);
+  }
+  return 2 * std::max(0.0, bottom - grid.info.accuracy);
+}
+
+PatchFacts facts_of(const Database& db, const std::vector<Blend::Placed>& placed, const Extent& place,
+                    double spacing) {
+  PatchFacts f;
+  const Grid* only = nullptr;
+  bool several = false;
+  const Database::Reading reading = db.reading();
+  for (const Blend::Placed& p : placed) {
+    if (!p.bounds.meets(place)) continue;
+    const Grid& grid = db.grid(p.id.grid());
+    several |= only && only != &grid;
+    only = &grid, f.any = true;
+    f.unsampled = std::max(f.unsampled, missed(grid, p.id, spacing));
+  }
+  if (only && !several) f.accuracy = only->info.accuracy + only->info.quantisation;
+  return f;
+}
+
+}  // namespace
+
+struct TileMaker::Impl {
+  std::shared_ptr<Device> device;
+  const Database& db;
+  const TileLattice& lattice;
+  vk::TileStore& store;
+  double base;
+  int smoothness;
+  std::size_t memory;
+  std::unique_ptr<VulkanBlend> blend;
+  vk::Bindings bindings;
+  vk::OwnedPipeline finish;
+  VkDescriptorSet set = VK_NULL_HANDLE;
+  vk::OwnedSets sets;
+  vk::Buffer summaries, slots;
+  vk::Commands commands;
+  TileMakerCounts counts;
+
+  Impl(std::shared_ptr<Device> d, const Database& database, const TileLattice& l, vk::TileStore& s, double b,
+       int k, std::size_t m)
+      : device(std::move(d)),
+        db(database),
+        lattice(l),
+        store(s),
+        base(b),
+        smoothness(k),
+        memory(m),
+        bindings(device->impl(), kTypes, sizeof(FinishPush)),
+        finish(vk::make_pipeline(bindings, shaders::tile_finish(), {})),
+        sets(bindings.make_set(set)),
+        summaries(device->impl(), kMost * kSummary * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                  vk::Where::readback),
+        slots(device->impl(), kMost * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, vk::Where::upload),
+        commands(device->impl()) {
+    bindings.bind(set, 1, store.heights), bindings.bind(set, 2, store.blocks);
+    bindings.bind(set, 3, VK_NULL_HANDLE, store.slopes.view(), VK_IMAGE_LAYOUT_GENERAL);
+    bindings.bind(set, 4, summaries), bindings.bind(set, 5, slots);
+  }
+
+  void use(const std::vector<PatchId>& patches) {
+    const std::uint64_t before = blend ? blend->pool().traffic().bytes : 0;
+    const std::uint64_t sent = blend ? blend->pool().traffic().sent : 0;
+    if (blend)
+      blend->change(patches);
+    else
+      blend = std::make_unique<VulkanBlend>(device, db, patches, BlendOptions{.smoothness = smoothness},
+                                            VulkanOptions{.memory = memory, .tile = kSide, .gradient = true});
+    counts.bytes += blend->pool().traffic().bytes - before;
+    counts.patches += blend->pool().traffic().sent - sent;
+  }
+
+  // The submission's results go to the slots of its tiles, and each tile's summary to the host.
+  void run_finish(const vk::Frame& frame, std::span<const std::uint32_t> to) {
+    const vk::OwnedView results = vk::texels(device->impl(), frame.results_on_card(), VK_FORMAT_R32_SFLOAT);
+    bindings.bind(set, 0, results);
+    std::copy(to.begin(), to.end(), reinterpret_cast<std::uint32_t*>(slots.mapped()));
+    const auto plane = std::uint32_t(to.size() * kSide * kSide);  // heights, bounds, slopes
+    const FinishPush p{plane, 2 * plane, float(blend->impl().base - base), smoothness == 0 ? 0.5f : 0.25f};
+    const VkCommandBuffer c = commands.begin();
+    vk::barrier(c);
+    vkCmdBindPipeline(c, VK_PIPELINE_BIND_POINT_COMPUTE, finish.get());
+    vkCmdBindDescriptorSets(c, VK_PIPELINE_BIND_POINT_COMPUTE, bindings.layout(), 0, 1, &set, 0, nullptr);
+    vkCmdPushConstants(c, bindings.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof p, &p);
+    vkCmdDispatch(c, std::uint32_t(to.size()), 1, 1);
+    vk::barrier(c);
+    commands.submit(), commands.wait();
+  }
+
+  TileFacts summary(std::size_t k, const TileKey& key, const PatchFacts& patches, bool improvable) const {
+    const float* s = reinterpret_cast<const float*>(summaries.mapped()) + k * kSummary;
+    TileFacts f;
+    const double shift = blend->impl().base;
+    f.lowest = double(s[0]) + shift, f.highest = double(s[1]) + shift;
+    f.bound = double(s[3]), f.holes = s[4] > 0;
+    f.reducible = patches.unsampled + (improvable ? std::max(0.0, f.bound - patches.accuracy) : 0);
+    f.error = double(s[2]) + f.reducible;
+    // A hole's outline is drawn to a cell.
+    if (f.holes) f.error = std::max(f.error, 1.5 * lattice.step(key.level));
+    return f;
+  }
+
+  std::vector<Made> make(std::span<const TileKey> tiles, const TakeSlot& take_slot);
+  void blend_tiles(std::span<const TileKey> tiles, std::span<const std::uint32_t> to,
+                   std::span<const PatchFacts> facts, const std::vector<PatchId>& sorted,
+                   std::vector<Made>& made);
+};
+
+void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<const std::uint32_t> to,
+                                  std::span<const PatchFacts> facts, const std::vector<PatchId>& sorted,
+                                  std::vector<Made>& made) {
+  std::vector<Tile> sampled;
+  for (const TileKey& k : tiles) sampled.push_back(sampled_tile(lattice, k));
+  VulkanBlend::Impl& b = blend->impl();
+  const RasterFrame frame = lattice.frame();
+  const auto start = std::chrono::steady_clock::now();
+  double finishing = 0;
+  const BlendCounts now = b.run(
+      frame, sampled, kSide,
+      [&](const TileBins& bins) {
+        vk::Work work = b.tile_work(frame, bins, kSide, kPlanes);
+        work.read_from = work.result_words;
+        return work;
+      },
+      [&](const vk::Frame& submission, std::size_t first, std::size_t n) {
+        const auto begun = std::chrono::steady_clock::now();
+        run_finish(submission, to.subspan(first, n));
+        for (std::size_t k = 0; k < n; ++k) {
+          const TileKey& key = tiles[first + k];
+          const bool improvable =
+              lattice.error(key.level) > 0 && is_improvable(db, sorted, with_halo(lattice, key));
+          made.push_back({key, summary(k, key, facts[first + k], improvable), to[first + k]});
+        }
+        finishing += ms_since(begun);
+      });
+  counts.blended.points += now.points, counts.blended.contributions += now.contributions;
+  counts.blended.most = std::max(counts.blended.most, now.most);
+  counts.blended.bound_max = std::max(counts.blended.bound_max, now.bound_max);
+  counts.blend_ms += ms_since(start) - finishing, counts.finish_ms += finishing;
+}
+
+std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tiles,
+                                                   const TakeSlot& take_slot) {
+  std::vector<Made> made;
+  if (tiles.empty()) return made;
+  const int level = tiles.front().level;
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<Extent> places;
+  for (const TileKey& k : tiles) places.push_back(with_halo(lattice, k));
+  const Extraction x = extract(db, TileCut(lattice.error(level), places));
+  counts.extract_ms += ms_since(start);
+  const auto sending = std::chrono::steady_clock::now();
+  use(x.patches);
+  counts.send_ms += ms_since(sending);
+  std::vector<PatchId> sorted = x.patches;
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<TileKey> filled;
+  std::vector<std::uint32_t> to;
+  std::vector<PatchFacts> facts;
+  for (std::size_t k = 0; k < tiles.size(); ++k) {
+    assert(tiles[k].level == level);
+    const PatchFacts f = facts_of(db, blend->impl().placed, places[k], 0.5 * lattice.step(level));
+    if (!f.any) {
+      made.push_back({tiles[k], {}, TileCache::kNoSlot});
+      continue;
+    }
+    const std::uint32_t slot = take_slot();
+    if (slot == TileCache::kNoSlot) break;
+    filled.push_back(tiles[k]), to.push_back(slot), facts.push_back(f);
+  }
+  for (std::size_t from = 0; from < filled.size(); from += kMost) {
+    const std::size_t n = std::min<std::size_t>(kMost, filled.size() - from);
+    blend_tiles(std::span(filled).subspan(from, n), std::span(to).subspan(from, n),
+                std::span(facts).subspan(from, n), sorted, made);
+  }
+  counts.tiles += filled.size();
+  return made;
+}
+
+TileMaker::TileMaker(std::shared_ptr<Device> device, const Database& db, const TileLattice& lattice,
+                     vk::TileStore& store, double base, int smoothness, std::size_t memory)
+    : impl_(std::make_unique<Impl>(std::move(device), db, lattice, store, base, smoothness, memory)) {}
+TileMaker::~TileMaker() = default;
+
+std::vector<TileMaker::Made> TileMaker::make(std::span<const TileKey> tiles, const TakeSlot& take_slot) {
+  return impl_->make(tiles, take_slot);
+}
+
+void TileMaker::prefetch(const Database& db, const TileLattice& lattice, const TileKey& tile) {
+  const Extraction x = extract(db, TileCut(lattice.error(tile.level), {with_halo(lattice, tile)}));
+  for (const PatchId id : x.patches) db.surface(id);
+}
+
+void TileMaker::restart() { impl_->blend.reset(); }
+const TileMakerCounts& TileMaker::counts() const { return impl_->counts; }
+
+}  // namespace patchwork

@@ -1,0 +1,309 @@
+// Tiles of a quadtree: where they lie, which are drawn, which share a slot, who owns the vertices of their
+// seams.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <set>
+
+#include "render/tile_cut.h"
+#include "render/tile_seams.h"
+#include "tests/blend/scene.h"
+
+namespace patchwork {
+namespace {
+
+const Land& land() {
+  static const Land l(surveys());
+  return l;
+}
+
+TEST(TileLattice, TheRootHoldsAllDataAndChildrenAreQuarters) {
+  const TileLattice t = TileLattice::over(land().db());
+  const Extent root = t.bounds(t.root()), data = land().db().extent();
+  EXPECT_LE(root.xmin, data.xmin);
+  EXPECT_LE(root.ymin, data.ymin);
+  EXPECT_GE(root.xmax, data.xmax);
+  EXPECT_GE(root.ymax, data.ymax);
+  for (const TileKey& k : {TileKey{5, 3, 2}, TileKey{1, 0, 7}})
+    for (int c = 0; c < 4; ++c) {
+      const Extent whole = t.bounds(k), part = t.bounds(k.child(c));
+      EXPECT_EQ(k.child(c).parent(), k);
+      EXPECT_DOUBLE_EQ(c & 1 ? part.xmax : part.xmin, c & 1 ? whole.xmax : whole.xmin);
+      EXPECT_DOUBLE_EQ(c >> 1 ? part.ymax : part.ymin, c >> 1 ? whole.ymax : whole.ymin);
+      EXPECT_EQ(t.first_x(k.child(c)), t.first_x(k) + (c & 1) * (TileLattice::kCells << k.level));
+    }
+  for (int l = 1; l < t.levels(); ++l) EXPECT_GE(t.error(l), t.error(l - 1));
+  EXPECT_EQ(t.error(0), 0) << "the finest level answers with the best there is";
+}
+
+TEST(TileLattice, VerticesOfAnUprightGridAreItsSamples) {
+  GridFile file = survey({.width = 50, .height = 40, .geotransform = {4005, 10, 0, 7213, 0, -10}}, 0);
+  const Land one({file});
+  const TileLattice t = TileLattice::over(one.db());
+  const Point sample = one.db().grids()[0].info.frame.to_domain(3, 5);
+  const double x = (sample.x - t.origin().x) / (2 * t.half_cell());
+  const double y = (sample.y - t.origin().y) / (2 * t.half_cell());
+  EXPECT_NEAR(x, std::round(x), 1e-9);
+  EXPECT_NEAR(y, std::round(y), 1e-9);
+}
+
+TEST(TileCut, FindsWhatAUniformCutOverEachPlaceFinds) {
+  const Database& db = land().db();
+  std::mt19937_64 random(test_seed(3));
+  std::uniform_real_distribution<double> x(0, 1800), size(10, 200), error(0, 30);
+  for (int n = 0; n < 50; ++n) {
+    std::vector<Extent> places;
+    std::set<PatchId> wanted;
+    const double e = error(random);
+    for (int k = 0; k < 3; ++k) {
+      const double px = x(random), py = x(random), s = size(random);
+      places.push_back({px, py, px + s, py + s});
+      const UniformCut cut{.error = e, .region = Region::inside(places.back())};
+      for (const PatchId id : extract(db, cut).patches) wanted.insert(id);
+    }
+    const Extraction found = extract(db, TileCut(e, places));
+    EXPECT_EQ(std::set<PatchId>(found.patches.begin(), found.patches.end()), wanted);
+  }
+}
+
+TEST(TileCut, NothingBetterThanTheBestAndSomethingBetterThanTheCoarsest) {
+  const Database& db = land().db();
+  const Extent place{400, 700, 500, 800};
+  const auto sorted = [&](double e) {
+    std::vector<PatchId> ids = extract(db, {.error = e}).patches;
+    std::sort(ids.begin(), ids.end());
+    return ids;
+  };
+  EXPECT_FALSE(is_improvable(db, sorted(0), place));
+  EXPECT_TRUE(is_improvable(db, sorted(1e6), place));
+}
+
+TEST(TileCache, GivesNoSlotOfThisFrameAwayAndKnowsWhoHasWhich) {
+  std::mt19937_64 random(test_seed(5));
+  for (const TilePolicy policy : {TilePolicy::first, TilePolicy::lru, TilePolicy::lru_error}) {
+    TileCache cache(8, policy);
+    std::set<TileKey> used;
+    for (int n = 0; n < 2000; ++n) {
+      if (n % 7 == 0) cache.begin_frame(), used.clear();
+      const TileKey key{0, int(random() % 6), int(random() % 5)};
+      const TileCache::Node* node = cache.find(key);
+      if (node && node->drawable()) {
+        cache.use(key, double(random() % 10));
+        used.insert(key);
+      } else {
+        const std::uint32_t slot = cache.take_slot();
+        if (slot == TileCache::kNoSlot) {
+          EXPECT_EQ(used.size(), 8u) << "all of them are used in this frame";
+          continue;
+        }
+        cache.put(key, {}, slot);
+        used.insert(key);
+      }
+      ASSERT_EQ(cache.find_violation(), "");
+      for (const TileKey& k : used) ASSERT_TRUE(cache.find(k)->drawable());
+    }
+    EXPECT_GT(cache.evictions(), 100u);
+  }
+}
+
+TEST(TileCache, TheLeastRecentlyUsedGoesFirst) {
+  TileCache cache(2, TilePolicy::lru);
+  const TileKey a{0, 0, 0}, b{0, 1, 0}, c{0, 2, 0};
+  cache.put(a, {}, cache.take_slot());
+  cache.put(b, {}, cache.take_slot());
+  cache.begin_frame();
+  cache.use(a, 1);
+  cache.begin_frame();
+  cache.put(c, {}, cache.take_slot());
+  EXPECT_TRUE(cache.find(a)->drawable());
+  EXPECT_FALSE(cache.find(b)->drawable());
+}
+
+// A cache in which tiles of random roughness exist, to a random depth, whatever the terrain.
+class Woods {
+ public:
+  explicit Woods(std::uint64_t seed) : random_(seed), lattice_(TileLattice::over(land().db())) {
+    grow(lattice_.root(), 1);
+  }
+
+  const TileLattice& lattice() const { return lattice_; }
+  TileCache cache{4000, TilePolicy::lru};
+
+  Camera camera() {
+    const Extent e = land().db().extent();
+    std::uniform_real_distribution<double> x(e.xmin, e.xmax), y(e.ymin, e.ymax), z(320, 800), d(-500, 500);
+    const Point3 eye{x(random_), y(random_), z(random_)};
+    return {eye, {eye.x + d(random_), eye.y + d(random_), eye.z - 200}, 60, 640, 360};
+  }
+
+ private:
+  void grow(const TileKey& key, double share) {
+    const auto chance = [&](double p) { return double(random_() % 1000) < 1000 * p; };
+    if (key.level + 3 < lattice_.levels() && chance(0.05)) {
+      cache.put(key, {}, TileCache::kNoSlot);
+      return;
+    }
+    TileFacts f{.lowest = 200, .highest = 400};
+    f.error = lattice_.step(key.level) * 0.1 * (0.2 + double(random_() % 100) / 50);
+    cache.put(key, f, cache.take_slot());
+    if (key.level > lattice_.levels() - 7 && chance(share))
+      for (int c = 0; c < 4; ++c) grow(key.child(c), 0.9);
+  }
+  std::mt19937_64 random_;
+  TileLattice lattice_;
+};
+
+TEST(TileSelection, CoversTheRootOnceAndNeighboursDifferByOneLevel) {
+  const std::uint64_t seed = test_seed(7);
+  int differing = 0;
+  for (std::uint64_t n = 0; n < 40; ++n) {
+    Woods woods(seed + n);
+    const Frustum frustum(woods.camera());
+    Selection s;
+    select_tiles(woods.lattice(), frustum, {.pixel_error = 1}, woods.cache, s);
+    double area = 0;
+    for (const auto& [key, place] : s.tiles) {
+      if (place == Selection::kSplit) {
+        for (int c = 0; c < 4; ++c) EXPECT_TRUE(s.tiles.contains(key.child(c)));
+        continue;
+      }
+      area += std::ldexp(1.0, 2 * key.level);
+      if (!s.leaves[place].drawn) continue;
+      for (int side = 0; side < 4; ++side) {
+        const TileKey beside = key.beside(side);
+        if (!woods.lattice().contains(beside) || s.tiles.contains(beside)) continue;
+        ++differing;
+        const auto larger = s.tiles.find(beside.parent());
+        if (larger == s.tiles.end()) {  // in something out of sight
+          const Selection::Leaf* leaf = s.leaf_at(beside, 0, 0);
+          EXPECT_FALSE(leaf->drawn);
+        }
+      }
+    }
+    EXPECT_EQ(area, std::ldexp(1.0, 2 * woods.lattice().root().level));
+  }
+  EXPECT_GT(differing, 100);
+}
+
+TEST(TileSelection, WhatIsTooRoughIsWantedAndTheErrorReachedIsTold) {
+  Woods woods(test_seed(9));
+  const Frustum frustum(woods.camera());
+  Selection s;
+  select_tiles(woods.lattice(), frustum, {.pixel_error = 1e-6}, woods.cache, s);
+  EXPECT_GT(s.pixels, 1e-6);
+  EXPECT_FALSE(s.wanted.empty());
+  double worst = 0;
+  for (const std::uint32_t k : s.drawn) worst = std::max(worst, s.leaves[k].pixels);
+  EXPECT_EQ(worst, s.pixels);
+  Selection few;
+  select_tiles(woods.lattice(), frustum, {.pixel_error = 1e-6, .most_tiles = 20}, woods.cache, few);
+  EXPECT_LE(few.drawn.size(), 20u);
+  EXPECT_GE(few.pixels, s.pixels) << "a smaller pool is a coarser picture, and says so";
+}
+
+// ---- seams
+// ---------------------------------------------------------------------------------------------------
+
+// terrain.glsl in C++: the texel of a border position, and where in the lattice it lies.
+std::uint32_t seam_texel(const TileDraw& d, int s, int t) {
+  if (t == 0 || t == 128) {
+    const int along = t == 0 ? 0 : 1;
+    return d.corners[std::size_t(s < 2 ? s + 2 * along : along + 2 * (s - 2))];
+  }
+  const TileDraw::Side& side = d.sides[std::size_t(s)];
+  if (t == 64) return d.middles[std::size_t(s)];
+  const std::uint32_t later = t > 64, past = std::uint32_t(t) - 64 * later;
+  return (later ? side.far : side.near) + (side.fine >> later & 1 ? past : past / 2) * side.step;
+}
+
+std::pair<std::int64_t, std::int64_t> place_of(const TileDraw& d, int s, int t) {
+  const std::int64_t along = std::int64_t(d.stride) * t, across = std::int64_t(d.stride) * 128 * (s & 1);
+  return s < 2 ? std::pair{d.x + across, d.y + along} : std::pair{d.x + along, d.y + across};
+}
+
+TEST(EdgeSplit, WhoeverSharesAVertexReadsTheSameTexel) {
+  const std::uint64_t seed = test_seed(11);
+  int shared = 0, finer = 0;
+  for (std::uint64_t n = 0; n < 40; ++n) {
+    Woods woods(seed + n);
+    const Camera camera = woods.camera();
+    Selection s;
+    select_tiles(woods.lattice(), Frustum(camera), {.pixel_error = 1}, woods.cache, s);
+    std::vector<TileDraw> draws;
+    make_draws(woods.lattice(), s, woods.cache, {camera.eye.x, camera.eye.y}, draws);
+    ASSERT_EQ(draws.size(), s.drawn.size());
+    std::map<std::pair<std::int64_t, std::int64_t>, std::uint32_t> texel_at;
+    for (const TileDraw& d : draws)
+      for (int side = 0; side < 4; ++side)
+        for (int t = 0; t <= 128; ++t) {
+          const bool fine = d.sides[std::size_t(side)].fine >> (t > 64) & 1;
+          if (t % 2 && !fine) continue;  // no vertex there
+          finer += fine;
+          const auto [at, is_new] = texel_at.try_emplace(place_of(d, side, t), seam_texel(d, side, t));
+          ASSERT_EQ(at->second, seam_texel(d, side, t)) << "side " << side << " position " << t;
+          shared += !is_new;
+        }
+  }
+  EXPECT_GT(shared, 10000);
+  EXPECT_GT(finer, 1000) << "levels meet";
+}
+
+// terrain.tesc in C++: the segments of each border edge, in the terms of its tile, from what blocks need.
+int border_need(const std::vector<TileDraw>& draws, const std::vector<std::array<int, 64>>& need,
+                std::size_t d, int s, int along) {
+  const auto at = [&](std::size_t draw, int side, int k) {
+    const int end = (side & 1) * 7;
+    return need[draw][std::size_t(side < 2 ? k * 8 + end : end * 8 + k)];
+  };
+  const int own = at(d, s, along);
+  const std::uint32_t other = (along < 4 ? draws[d].beside_near : draws[d].beside_far)[std::size_t(s)];
+  if (other == TileDraw::kAlone) return own;
+  const std::size_t number = other & 0x1fffffffu;
+  if (other & TileDraw::kFiner) {
+    const int first = 2 * (along % 4);
+    return std::max(own, 2 * std::max(at(number, s ^ 1, first), at(number, s ^ 1, first + 1)));
+  }
+  if (other & TileDraw::kLarger) {
+    const int theirs = (other & TileDraw::kSecondHalf ? 4 : 0) + along / 2;
+    return std::max(at(number, s ^ 1, theirs), 2 * std::max(own, at(d, s, along ^ 1))) / 2;
+  }
+  return std::max(own, at(number, s ^ 1, along));
+}
+
+TEST(EdgeSplit, EverySharedEdgeIsSplitAtTheSamePlaces) {
+  const std::uint64_t seed = test_seed(13);
+  std::size_t edges = 0;
+  for (std::uint64_t n = 0; n < 40; ++n) {
+    Woods woods(seed + n);
+    const Camera camera = woods.camera();
+    Selection s;
+    select_tiles(woods.lattice(), Frustum(camera), {.pixel_error = 1}, woods.cache, s);
+    std::vector<TileDraw> draws;
+    make_draws(woods.lattice(), s, woods.cache, {camera.eye.x, camera.eye.y}, draws);
+    std::mt19937_64 random(seed + n);
+    std::vector<std::array<int, 64>> need(draws.size());
+    for (auto& tile : need)
+      for (int& b : tile) b = 1 << random() % 4;
+    // Segments of shared lines: each must be there twice, from either side.
+    using Place = std::pair<std::int64_t, std::int64_t>;
+    std::map<std::pair<Place, Place>, int> segments;
+    for (std::size_t d = 0; d < draws.size(); ++d)
+      for (int side = 0; side < 4; ++side)
+        for (int along = 0; along < 8; ++along) {
+          const std::uint32_t other =
+              (along < 4 ? draws[d].beside_near : draws[d].beside_far)[std::size_t(side)];
+          if (other == TileDraw::kAlone) continue;
+          const int parts = border_need(draws, need, d, side, along);
+          for (int k = 0; k < parts; ++k)
+            ++segments[{place_of(draws[d], side, 16 * along + 16 * k / parts),
+                        place_of(draws[d], side, 16 * along + 16 * (k + 1) / parts)}];
+        }
+    for (const auto& [segment, times] : segments) ASSERT_EQ(times, 2);
+    edges += segments.size();
+  }
+  EXPECT_GT(edges, 10000u);
+}
+
+}  // namespace
+}  // namespace patchwork

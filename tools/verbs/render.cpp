@@ -1,0 +1,187 @@
+// patchwork render: pictures of the terrain without a window.
+#include <fmt/format.h>
+#include <gdal_priv.h>
+
+#include <filesystem>
+
+#include "db/error.h"
+#include "render/camera_path.h"
+#include "render/renderer.h"
+#include "render/scene.h"
+#include "tools/cli.h"
+#include "tools/unfinished_files.h"
+
+namespace patchwork::cli {
+
+namespace {
+
+struct Options {
+  std::string database, out, scene, depth;
+  std::vector<int> size;
+  double pixel_error = 0;
+  bool stats = false, published = false;
+};
+
+// DIR/NAME.EXT of frame 7 of a path is DIR/NAME_0007.EXT.
+std::string numbered(const std::string& path, int frame) {
+  std::filesystem::path p(path);
+  p.replace_filename(fmt::format("{}_{:04}{}", p.stem().string(), frame, p.extension().string()));
+  return p.string();
+}
+
+void write_depth(const std::string& path, const std::vector<float>& metres, int width, int height) {
+  GDALAllRegister();
+  UnfinishedFiles unfinished({path});
+  CPLErrorReset();
+  GDALDatasetUniquePtr file(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
+      path.c_str(), width, height, 1, GDT_Float32, nullptr));
+  if (!file) throw Error(path, "GDAL cannot make it", "check the folder and its permissions");
+  GDALRasterBand& band = *file->GetRasterBand(1);
+  band.SetNoDataValue(std::numeric_limits<double>::quiet_NaN());
+  band.SetDescription("metres along the ray through the pixel's centre");
+  const CPLErr error = band.RasterIO(GF_Write, 0, 0, width, height, const_cast<float*>(metres.data()), width,
+                                     height, GDT_Float32, 0, 0, nullptr);
+  file->FlushCache(true);
+  if (error != CE_None || CPLGetLastErrorType() >= CE_Failure)
+    throw Error(path, "it cannot be written in full", "is the disk full?");
+  unfinished.keep();
+}
+
+// All frames' numbers together.
+struct Total {
+  int frames = 0;
+  std::size_t patches = 0;
+  double bound_max = 0, pixels_reached = 0, query = 0, fetch = 0, blend = 0, tessellate = 0, draw = 0,
+         write = 0;
+  BlendCounts blended;
+
+  void add(const FrameStats& s) {
+    ++frames, patches += s.patches_sent;
+    bound_max = std::max(bound_max, s.bound_max), pixels_reached = std::max(pixels_reached, s.pixels_reached);
+    query += s.select_ms + s.extract_ms, fetch += s.send_ms, blend += s.blend_ms;
+    tessellate += s.finish_ms + s.factors_ms, draw += s.draw_ms;
+    blended.points += s.blended.points, blended.contributions += s.blended.contributions;
+    blended.most = std::max(blended.most, s.blended.most);
+  }
+};
+
+Json facts(const FrameStats& s) {
+  return {{"ms",
+           {{"select", s.select_ms},
+            {"extract", s.extract_ms},
+            {"send", s.send_ms},
+            {"blend", s.blend_ms},
+            {"finish", s.finish_ms},
+            {"factors", s.factors_ms},
+            {"draw", s.draw_ms},
+            {"total", s.total_ms}}},
+          {"patches", s.patches_sent},
+          {"tiles_drawn", s.tiles_drawn},
+          {"tiles_made", s.tiles_made},
+          {"triangles", s.triangles},
+          {"dispatches", s.dispatches},
+          {"draws", s.draws},
+          {"bytes_up", s.bytes_up},
+          {"pixel_error_asked", s.pixels_asked},
+          {"pixel_error_reached", s.pixels_reached},
+          {"bound_max", s.bound_max}};
+}
+
+std::vector<Camera> cameras(const Database& db, const Scene& scene) {
+  if (scene.camera) return {scene.view()};
+  if (scene.path) {
+    const CameraPath path(*scene.path);
+    std::vector<Camera> all;
+    for (int k = 0; k < path.frames(); ++k) all.push_back(path.frame(k, scene.width, scene.height));
+    return all;
+  }
+  double lowest = INFINITY, highest = -INFINITY;
+  for (const Grid& g : db.grids())
+    lowest = std::min(lowest, g.info.lowest), highest = std::max(highest, g.info.highest);
+  return {overview(db.extent(), lowest, highest, 45, scene.width, scene.height)};
+}
+
+Json summary(const Total& t, const Scene& scene, const std::string& device, double seconds) {
+  const double points = std::max<double>(1, double(t.blended.points));
+  return {{"seconds", seconds},
+          {"frames", t.frames},
+          {"pixels", std::size_t(scene.width) * std::size_t(scene.height) * std::size_t(t.frames)},
+          {"patches", t.patches},
+          {"bound_max", t.bound_max},
+          {"pixel_error_asked", scene.pixel_error},
+          {"pixel_error_reached", t.pixels_reached},
+          {"stages",
+           {{"query", t.query / 1000},
+            {"fetch", t.fetch / 1000},
+            {"blend", t.blend / 1000},
+            {"tessellate", t.tessellate / 1000},
+            {"draw", t.draw / 1000},
+            {"write", t.write}}},
+          {"contributors_mean", double(t.blended.contributions) / points},
+          {"contributors_max", t.blended.most},
+          {"engine", device}};
+}
+
+void run(const Options& o, const Common& common) {
+  const auto start = std::chrono::steady_clock::now();
+  const Database db = Database::open(o.database, common.memory);
+  if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  Scene scene = o.scene.empty() ? Scene{} : read_scene(o.scene);
+  if (!o.size.empty()) scene.width = o.size[0], scene.height = o.size[1];
+  if (o.pixel_error > 0) scene.pixel_error = o.pixel_error;
+  const std::vector<Camera> views = cameras(db, scene);
+  const auto device = Device::open();
+  Renderer renderer(device, db,
+                    {.width = scene.width,
+                     .height = scene.height,
+                     .pixel_error = scene.pixel_error,
+                     .smoothness = scene.smoothness,
+                     .memory = std::min<std::size_t>(common.memory / 2, std::size_t{1} << 30),
+                     .background = scene.background,
+                     .published = o.published});
+  Total total;
+  Json frames = Json::array();
+  ProgressBar bar(common, "render", double(views.size()), "frames");
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    const FrameStats s = renderer.draw(views[k]);
+    total.add(s);
+    if (o.stats) frames.push_back(facts(s));
+    const auto writing = std::chrono::steady_clock::now();
+    const auto name = [&](const std::string& path) { return scene.path ? numbered(path, int(k)) : path; };
+    write_png(name(o.out), renderer.picture());
+    if (!o.depth.empty()) write_depth(name(o.depth), renderer.depth(), scene.width, scene.height);
+    total.write += seconds_since(writing);
+    bar.show(double(k + 1) / double(views.size()));
+  }
+  Json document = summary(total, scene, device->name(), seconds_since(start));
+  if (o.stats) document["per_frame"] = frames;
+  if (common.json || o.stats) return print(document);
+  if (common.quiet) return;
+  fmt::print(
+      "{}: {} picture{} of {} x {}, {:.3g} px of error asked, {:.3g} reached, bound at most {:.4g} m, {:.2f} "
+      "s\n",
+      o.out, total.frames, total.frames == 1 ? "" : "s", scene.width, scene.height, scene.pixel_error,
+      total.pixels_reached, total.bound_max, seconds_since(start));
+}
+
+}  // namespace
+
+void add_render(CLI::App& app, Common& common) {
+  auto o = std::make_shared<Options>();
+  CLI::App* v = verb(app, common, "render", "pictures of the terrain: one, or one for each frame of a path");
+  v->add_option("DB", o->database, "the database")->required();
+  v->add_option("OUT", o->out, "the PNG to write; along a path OUT_0000.png, OUT_0001.png, ...")->required();
+  v->add_option("--scene", o->scene, "JSON: camera or path, pixel error, effects (render/scene.schema.json)");
+  v->add_option("--size", o->size, "width height, pixels; else the scene's")
+      ->expected(2)
+      ->check(CLI::Range(1, 16384));
+  v->add_option("--pixel-error", o->pixel_error, "largest error on the screen, pixels; else the scene's")
+      ->check(CLI::PositiveNumber);
+  v->add_option("--depth", o->depth, "also writes metres along each pixel's ray (GeoTIFF)");
+  v->add_flag("--stats", o->stats, "what each frame cost and reached, as JSON");
+  v->add_flag("--published", o->published, "tessellates as published, without the guarantee: for comparison");
+  v->add_flag("--json", common.json, "one JSON document on stdout");
+  v->callback([o, &common] { run(*o, common); });
+}
+
+}  // namespace patchwork::cli

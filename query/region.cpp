@@ -53,7 +53,7 @@ Region Region::inside(std::vector<Point> corners) {
   return r;
 }
 
-Region Region::parse_polygon(const std::string& text) {
+std::vector<Point> parse_points(const std::string& what, const std::string& text) {
   std::string numbers = text;
   const std::size_t open = numbers.find_last_of('('), close = numbers.find(')');
   if (open != std::string::npos && close != std::string::npos && open < close)
@@ -67,8 +67,15 @@ Region Region::parse_polygon(const std::string& text) {
     if (paired) corners.push_back(p);
   }
   if (!in.eof() || !paired)
-    throw Error("polygon", "cannot read \"" + text + "\"", "write it as \"x y, x y, x y\"");
-  return inside(std::move(corners));
+    throw Error(what, "cannot read \"" + text + "\"", "write it as \"x y, x y, x y\"");
+  return corners;
+}
+
+Region Region::parse_polygon(const std::string& text) { return inside(parse_points("polygon", text)); }
+
+bool Region::contains(Point p) const {
+  if (!bounds_.contains(p)) return false;
+  return corners_.empty() || bg::covered_by(Vertex(p.x, p.y), polygon_of(corners_));
 }
 
 bool Region::meets(const Grid& grid, const GridShape::Block& b) const {

@@ -20,6 +20,7 @@ class Region {
   static Region parse_polygon(const std::string& text);
 
   const Extent& bounds() const { return bounds_; }
+  bool contains(Point p) const;
   /// Does the domain of a patch meet the region?
   bool meets(const Grid& grid, const GridShape::Block& block) const;
 
@@ -27,5 +28,8 @@ class Region {
   Extent bounds_{-1e300, -1e300, 1e300, 1e300};
   std::vector<Point> corners_;  // of a polygon; empty for a rectangle
 };
+
+/// Reads "x y, x y, ..." or WKT of one ring or line. Throws Error(what, ...).
+std::vector<Point> parse_points(const std::string& what, const std::string& text);
 
 }  // namespace patchwork

@@ -34,6 +34,8 @@ void add_check(CLI::App& app, Common& common);
 void add_list(CLI::App& app, Common& common);
 void add_info(CLI::App& app, Common& common);
 void add_query(CLI::App& app, Common& common);
+void add_profile(CLI::App& app, Common& common);
+void add_sight(CLI::App& app, Common& common);
 void add_sample(CLI::App& app, Common& common);
 void add_resample(CLI::App& app, Common& common);
 void add_cost(CLI::App& app, Common& common);

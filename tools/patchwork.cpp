@@ -48,6 +48,8 @@ int main(int argc, char** argv) {
   cli::add_info(app, common);
   cli::add_query(app, common);
   cli::add_sample(app, common);
+  cli::add_profile(app, common);
+  cli::add_sight(app, common);
   cli::add_resample(app, common);
   cli::add_cost(app, common);
   cli::add_render(app, common);

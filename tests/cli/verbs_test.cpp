@@ -7,7 +7,7 @@ namespace patchwork {
 
 namespace {
 
-const Words kVerbs{"import", "list", "info", "query", "sample", "resample"};
+const Words kVerbs{"import", "list", "info", "query", "sample", "resample", "profile", "sight"};
 
 std::vector<std::string> missing_keys(const Json& document, const Words& keys) {
   std::vector<std::string> missing;

@@ -1,0 +1,105 @@
+// The questions of surveyors: sight and profile, as a person asks them.
+#include <cmath>
+
+#include "tests/cli/command.h"
+
+namespace patchwork {
+
+namespace {
+
+// A plain of 100 m with a wall of 20 m along x = 500 300, cells of 10 m.
+RasterFile walled_plain() {
+  RasterFile f{.width = 101, .height = 61};
+  f.geotransform = {500000, 10, 0, 5000000, 0, -10};
+  f.at = [](int i, int) { return i == 30 ? 120.0 : 100.0; };
+  return f;
+}
+
+}  // namespace
+
+class Survey : public CliTest {
+ protected:
+  Survey() {
+    const std::string file = make(walled_plain(), "plain.tif");
+    EXPECT_EQ(run({"import", database_, file, "--accuracy", "0.1", "--quiet"}).code, 0);
+  }
+  const std::string database_ = in_directory("plain.pwk");
+};
+
+using SightVerb = Survey;
+
+TEST_F(SightVerb, TellsWhatHidesATarget) {
+  const Words ends{"--from", "500105", "4999705", "1.8", "--to", "500805", "4999705", "2"};
+  Words words{"sight", database_, "--json"};
+  words.insert(words.end(), ends.begin(), ends.end());
+  const Json ray = json(words)["rays"][0];
+  EXPECT_EQ(ray["visible"], false);
+  EXPECT_EQ(ray["verdict"], "hidden");
+  EXPECT_NEAR(ray["nearest"]["distance"].get<double>(), 200, 1) << "the wall's crest";
+  EXPECT_NEAR(ray["clearance"].get<double>(), 101.86 - 120, 0.05);
+  EXPECT_NEAR(ray["hit"]["distance"].get<double>(), 190.9, 0.2) << "on its slope";
+  Words text = words;
+  text.erase(text.begin() + 2);
+  const Outcome o = run(text);
+  EXPECT_EQ(o.code, 0);
+  EXPECT_SAYS(o.out, "hidden, whatever the terrain is within its bounds");
+  text[5 + 0] = "30";  // from high above
+  EXPECT_SAYS(run(text).out, "visible");
+}
+
+TEST_F(SightVerb, FindsTheFirstHitOfARay) {
+  const Json ray =
+      json({"sight", database_, "--json", "--flat", "--from", "500105", "4999705", "10", "--distance", "150",
+            "--azimuth", "90", "--elevation", "-5.710593137499643"})["rays"][0];
+  EXPECT_NEAR(ray["hit"]["distance"].get<double>(), 100, 0.01) << "falls by a tenth";
+  EXPECT_NEAR(ray["hit"]["at"][0].get<double>(), 500205, 0.01);
+  EXPECT_EQ(json({"sight", database_, "--json", "--from", "500105", "4999705", "10", "--distance", "150",
+                  "--azimuth", "90"})["rays"][0]["hit"],
+            nullptr);
+}
+
+TEST_F(SightVerb, AnswersLinesInOrder) {
+  const Outcome o = run(
+      {"sight", database_},
+      {.input = "500105 4999705 1.8 500805 4999705 2\n# a comment\n\n500105,4999705,1,500205,4999705,1\n"});
+  ASSERT_EQ(o.code, 0) << o.err;
+  const Words lines = lines_of(o.out);
+  ASSERT_EQ(lines.size(), 2u);
+  EXPECT_EQ(lines[0].rfind("hidden hidden -18.", 0), 0u) << lines[0];
+  EXPECT_EQ(lines[1].rfind("visible visible ", 0), 0u) << lines[1];
+  EXPECT_EQ(run({"sight", database_}, {.input = ""}).code, 0);
+}
+
+TEST_F(SightVerb, RefusesWhatItCannotRead) {
+  EXPECT_SAYS(complaint(run({"sight", database_}, {.input = "1 2 3\n"})), "line 1");
+  EXPECT_SAYS(complaint(run({"sight", database_}, {.input = "0 0 3 500105 4999705 1\n"})), "no ground");
+  EXPECT_EQ(run({"sight", database_, "--absolute"}, {.input = "0 0 103 500105 4999705 101\n"}).code, 0);
+  EXPECT_EQ(run({"sight", database_, "--from", "1", "2", "3"}).code, 2);
+  EXPECT_EQ(run({"sight", database_, "--to", "1", "2", "3"}).code, 2);
+}
+
+using ProfileVerb = Survey;
+
+TEST_F(ProfileVerb, WritesPointsAndSumsThemUp) {
+  const Json p =
+      json({"profile", database_, "--json", "--line", "500105 4999705, 500505 4999705", "--step", "10"});
+  EXPECT_EQ(p["length"], 400);
+  EXPECT_EQ(p["points"].size(), 41u);
+  EXPECT_NEAR(p["ascent"].get<double>(), 20, 1e-3);
+  EXPECT_NEAR(p["descent"].get<double>(), 20, 1e-3);
+  EXPECT_NEAR(p["highest"].get<double>(), 120, 1e-3);
+  EXPECT_GE(p["bound_max"].get<double>(), 0.1);
+  const Outcome o = run({"profile", database_, "--line", "LINESTRING(500105 4999705, 500505 4999705)"});
+  EXPECT_EQ(o.code, 0);
+  EXPECT_EQ(lines_of(o.out).size(), 41u) << "the grid's own step";
+  EXPECT_SAYS(o.out, " plain");
+  EXPECT_SAYS(o.err, "up 20.00 m");
+}
+
+TEST_F(ProfileVerb, RefusesWhatIsNoLine) {
+  EXPECT_SAYS(complaint(run({"profile", database_, "--line", "1 2", "--step", "1"})), "two points");
+  EXPECT_SAYS(complaint(run({"profile", database_, "--line", "1 2, x"})), "cannot read");
+  EXPECT_EQ(run({"profile", database_}).code, 2);
+}
+
+}  // namespace patchwork

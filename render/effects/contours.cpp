@@ -1,5 +1,7 @@
 #include "render/effects/contours.h"
 
+#include <cmath>
+
 #include "render/fields.h"
 
 namespace patchwork::effects {
@@ -10,6 +12,11 @@ void describe(Fields<Contours>& f) {
   f.number("width", &Contours::width, between(0.1, 20), "pixels; bold lines are twice as wide");
   f.color("color", &Contours::color, "of the lines");
   f.number("opacity", &Contours::opacity, between(0, 1), "of the lines");
+}
+
+bool can_matter(const Contours& c, double lowest, double highest) {
+  const double reach = 0.25 * c.interval;
+  return std::floor((highest + reach) / c.interval) * c.interval >= lowest - reach;
 }
 
 }  // namespace patchwork::effects

@@ -19,5 +19,9 @@ struct Contours {
 };
 void describe(Fields<Contours>& fields);
 
+/// Can a line reach ground between two heights? contours.glsl lets none reach farther than a quarter of the
+/// interval.
+bool can_matter(const Contours& contours, double lowest, double highest);
+
 }  // namespace effects
 }  // namespace patchwork

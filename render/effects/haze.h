@@ -18,5 +18,11 @@ struct Haze {
 };
 void describe(Fields<Haze>& fields);
 
+/// Optical depth a metre at a height.
+double depth_per_metre(const Haze& haze, double height);
+/// An upper bound of what it changes in a channel (sRGB, 0 to 1) of ground at most `farthest` metres away,
+/// where the air is nowhere lower than `lowest`.
+double most_change(const Haze& haze, double farthest, double lowest);
+
 }  // namespace effects
 }  // namespace patchwork

@@ -1,6 +1,8 @@
 // Sun shadow: where terrain stands between the ground and the sun.
 #pragma once
 
+#include "render/effects/sun.h"
+
 namespace patchwork {
 
 template <class T>
@@ -13,6 +15,10 @@ struct Shadow {
   double strength = 1;     ///< 1: no sun light at all in the shadow
 };
 void describe(Fields<Shadow>& fields);
+
+/// False only if no place whose terrain rises by `steepest` (tangent) lies in any shadow, nor in its fading
+/// edge; or if the sun is down.
+bool can_matter(const Shadow& shadow, const Sun& sun, double steepest);
 
 }  // namespace effects
 }  // namespace patchwork

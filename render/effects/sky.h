@@ -17,5 +17,12 @@ struct Sky {
 };
 void describe(Fields<Sky>& fields);
 
+/// Tangent of the elevation of the lowest of its directions: 3.58 degrees or more (sin^2 of it is what a
+/// horizon of that height takes of the light, 1/256) for the 128 directions that sky.glsl can tell apart at
+/// most.
+double lowest_direction(const Sky& sky);
+/// False only if no direction's bit is taken anywhere where terrain rises by at most `steepest`.
+bool can_matter(const Sky& sky, double steepest);
+
 }  // namespace effects
 }  // namespace patchwork

@@ -18,5 +18,8 @@ struct Water {
 };
 void describe(Fields<Water>& fields);
 
+/// Is there ground below its level?
+inline bool can_matter(const Water& water, double lowest) { return lowest < water.level; }
+
 }  // namespace effects
 }  // namespace patchwork

@@ -7,9 +7,8 @@
 
 #include "db/error.h"
 #include "render/tile_seams.h"
-#include "render/tile_selection.h"
+#include "render/tile_supply.h"
 #include "render/vulkan/terrain_pass_impl.h"
-#include "render/vulkan/tile_maker.h"
 
 namespace patchwork {
 
@@ -50,15 +49,12 @@ struct Renderer::Impl {
   TileLattice lattice;
   double base;
   vk::TileStore store;
-  TileCache cache;
+  TileSupply supply;
   vk::Target target;
-  std::uint32_t most_tiles;
   vk::TerrainPass terrain;
-  TileMaker maker;
   vk::Commands commands;
   vk::Timer timer;
   vk::OwnedQueries counter;
-  Selection selection;
   std::vector<TileDraw> draws, last_draws;
   vk::FrameBlock block{};
   Camera camera;
@@ -72,11 +68,9 @@ struct Renderer::Impl {
         lattice(TileLattice::over(db)),
         base(middle_height(db)),
         store(card, vk::TileStore::slots_within(card, o.memory / 2)),
-        cache(store.slots, o.policy),
+        supply(device, db, lattice, store, base, o),
         target(card, std::uint32_t(o.width), std::uint32_t(o.height)),
-        most_tiles(store.slots * 2 / 3),
-        terrain(card, store, target.pass(), most_tiles),
-        maker(device, db, lattice, store, base, o.smoothness, o.memory / 2),
+        terrain(card, store, target.pass(), supply.most_tiles()),
         commands(card),
         timer(card, 3),
         counter(make_counter()) {
@@ -94,30 +88,6 @@ struct Renderer::Impl {
     return vk::OwnedQueries(card.get(), pool);
   }
 
-  void select(const Frustum& frustum, FrameStats& stats) {
-    const auto start = Clock::now();
-    select_tiles(lattice, frustum, {options.pixel_error, most_tiles}, cache, selection);
-    stats.select_ms += ms_since(start);
-  }
-
-  // Makes what the selection wants, level by level; false if nothing could be made.
-  bool make_wanted() {
-    std::vector<TileKey> keys;
-    for (const Selection::Wanted& w : selection.wanted) keys.push_back(w.key);
-    std::stable_sort(keys.begin(), keys.end(),
-                     [](const TileKey& a, const TileKey& b) { return a.level > b.level; });
-    std::size_t made = 0;
-    for (std::size_t from = 0; from < keys.size();) {
-      std::size_t to = from;
-      while (to < keys.size() && keys[to].level == keys[from].level) ++to;
-      const auto some = std::span(keys).subspan(from, to - from);
-      for (const TileMaker::Made& m : maker.make(some, [&] { return cache.take_slot(); }))
-        cache.put(m.key, m.facts, m.slot), ++made;
-      from = to;
-    }
-    return made > 0;
-  }
-
   vk::FrameBlock make_block(const Frustum& frustum) const {
     vk::FrameBlock b{};
     put_matrix(projection(camera, kNear) * glm::dmat4(view_rotation(camera)), b.clip);
@@ -129,8 +99,10 @@ struct Renderer::Impl {
     b.eye[0] = float(camera.eye.x - (lattice.origin().x + cell[0] * lattice.half_cell()));
     b.eye[1] = float(camera.eye.y - (lattice.origin().y + cell[1] * lattice.half_cell()));
     b.eye[2] = float(base - camera.eye.z), b.eye[3] = float(lattice.half_cell());
-    b.detail[0] = float(frustum.gamma() / options.pixel_error), b.detail[1] = float(options.curvature);
-    b.detail[2] = float(frustum.gamma()), b.detail[3] = options.published;
+    // As published: pixels per unit of tangent, though a picture's corners show more of them.
+    const double gamma = options.published ? camera.gamma() : frustum.gamma();
+    b.detail[0] = float(gamma / options.pixel_error), b.detail[1] = float(options.curvature);
+    b.detail[2] = float(gamma), b.detail[3] = options.published;
     return b;
   }
 
@@ -165,19 +137,7 @@ struct Renderer::Impl {
   }
 
   FrameStats draw(const Camera& from);
-  void note_made(const TileMakerCounts& before, FrameStats& stats) const;
 };
-
-void Renderer::Impl::note_made(const TileMakerCounts& before, FrameStats& stats) const {
-  const TileMakerCounts& after = maker.counts();
-  stats.tiles_made = after.tiles - before.tiles, stats.patches_sent = after.patches - before.patches;
-  stats.bytes_up = after.bytes - before.bytes;
-  stats.extract_ms = after.extract_ms - before.extract_ms, stats.send_ms = after.send_ms - before.send_ms;
-  stats.blend_ms = after.blend_ms - before.blend_ms, stats.finish_ms = after.finish_ms - before.finish_ms;
-  stats.blended = after.blended;
-  stats.blended.points -= before.blended.points;
-  stats.blended.contributions -= before.blended.contributions;
-}
 
 FrameStats Renderer::Impl::draw(const Camera& from) {
   const auto start = Clock::now();
@@ -185,17 +145,12 @@ FrameStats Renderer::Impl::draw(const Camera& from) {
   stats.pixels_asked = options.pixel_error;
   camera = from, camera.width = options.width, camera.height = options.height;
   const Frustum frustum(camera, options.curvature);
-  const TileMakerCounts before = maker.counts();
-  cache.begin_frame();
-  do select(frustum, stats);
-  while (!selection.wanted.empty() && make_wanted());
-  make_draws(lattice, selection, cache, {camera.eye.x, camera.eye.y}, draws);
+  const Selection& selection = supply.update(frustum, stats);
+  make_draws(lattice, selection, supply.cache(), {camera.eye.x, camera.eye.y}, draws);
   const vk::FrameBlock now = make_block(frustum);
-  note_made(before, stats);
-  stats.tiles_drawn = draws.size(), stats.tiles_wanted = selection.wanted.size();
-  stats.pixels_reached = selection.pixels;
+  stats.tiles_drawn = draws.size();
   for (const std::uint32_t k : selection.drawn)
-    stats.bound_max = std::max(stats.bound_max, cache.find(selection.leaves[k].key)->facts.bound);
+    stats.bound_max = std::max(stats.bound_max, supply.cache().find(selection.leaves[k].key)->facts.bound);
   // With the same input the picture is the one that is there.
   if (!drawn || stats.tiles_made > 0 || now != block || draws != last_draws) {
     terrain.set(now, draws);
@@ -237,12 +192,22 @@ std::vector<float> Renderer::depth() const {
   return metres;
 }
 
-void Renderer::restate(const std::vector<Extent>& changed) {
-  for (const Extent& e : changed) impl_->cache.invalidate(impl_->lattice, e);
-  impl_->maker.restart();
+bool Renderer::refresh(Database& db) {
+  if (!impl_->supply.hold()) return false;
+  const std::uint64_t before = db.version();
+  const bool moved = db.refresh();
+  std::vector<Extent> changed;
+  bool another_lattice = false;
+  if (moved && !db.grids().empty()) {
+    for (const Change& c : db.changed_since(before)) changed.push_back(c.extent);
+    another_lattice = !impl_->lattice.fits(db);
+    if (another_lattice) impl_->lattice = TileLattice::over(db);
+  }
+  impl_->supply.release(moved, changed, another_lattice);
+  return moved;
 }
 
-const TileCache& Renderer::cache() const { return impl_->cache; }
+const TileCache& Renderer::cache() const { return impl_->supply.cache(); }
 const TileLattice& Renderer::lattice() const { return impl_->lattice; }
 
 }  // namespace patchwork

@@ -20,6 +20,10 @@ struct RendererOptions {
   std::size_t memory = std::size_t{512} << 20;  ///< bytes on the card: half for tiles, half for patches
   TilePolicy policy = TilePolicy::lru;
   Color background{0xbf, 0xd4, 0xe8};
+  /// Frames do not wait: missing tiles are read by workers and made within make_ms a frame.
+  bool realtime = false;
+  double make_ms = 8;
+  int workers = 1;
   bool published = false;  ///< tessellation as published, without the guarantee (vulkan/factors.comp)
   double curvature = 0;  ///< metres by which the earth drops away, per square metre of distance in the plane
 };
@@ -31,7 +35,7 @@ struct FrameStats {
   double total_ms = 0;
   std::size_t tiles_drawn = 0, tiles_made = 0, tiles_wanted = 0;  ///< wanted: still missing
   std::size_t patches_sent = 0, bytes_up = 0;
-  std::size_t dispatches = 0, draws = 0;  ///< of tiles made: their own; draws in an indirect call
+  std::size_t dispatches = 0, draws = 0;  ///< the blend's own not counted; draws of the indirect calls
   std::uint64_t triangles = 0;            ///< 0 where the device does not count
   double pixels_asked = 0, pixels_reached = 0;
   double bound_max = 0;  ///< metres: of all heights drawn
@@ -47,16 +51,18 @@ class Renderer {
   Renderer(std::shared_ptr<Device> device, const Database& db, const RendererOptions& options);
   ~Renderer();
 
-  /// Waits until all that the picture needs is there. A frame whose input is that of the one before is not
-  /// drawn again. Throws Error: the device's memory, damaged payloads.
+  /// Waits until all that the picture needs is there, unless it is realtime. A frame whose input
+  /// is that of the one before is not drawn again: FrameStats::draws is 0. Throws Error: the device's memory,
+  /// damaged payloads.
   FrameStats draw(const Camera& camera);
   /// What was drawn last, read from the card when asked for.
   Image picture() const;
   /// Metres along the ray through each pixel's centre, row-major; NaN where there is sky.
   std::vector<float> depth() const;
 
-  /// After the database moved to another state: tiles that `changed` touches are made anew.
-  void restate(const std::vector<Extent>& changed);
+  /// Moves the database that it draws to its newest state; false if it is in it. Tiles that changes touch are
+  /// made anew, all others stay as they are. REQUIRES: `db` is the constructor's.
+  bool refresh(Database& db);
   const TileCache& cache() const;
   const TileLattice& lattice() const;
 

@@ -53,6 +53,13 @@ Extent TileLattice::bounds(const TileKey& k) const {
   return {x, y, x + side, y + side};
 }
 
+bool TileLattice::fits(const Database& db) const {
+  const Extent root = bounds(this->root()), data = db.extent();
+  for (const Grid& g : db.grids())
+    if (step_of(g.info) < step(0) * 0.99 && levels() < kMaxLevels) return false;
+  return root.contains({data.xmin, data.ymin}) && root.contains({data.xmax, data.ymax});
+}
+
 TileLattice TileLattice::over(const Database& db) {
   TileLattice t;
   if (db.grids().empty()) return t;

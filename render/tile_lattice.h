@@ -39,6 +39,9 @@ class TileLattice {
   /// the patches of its step keep to. Reads a bounded number of records.
   static TileLattice over(const Database& db);
 
+  /// False where its root does not hold all data, or its finest step is larger than a grid's.
+  bool fits(const Database& db) const;
+
   int levels() const { return int(errors_.size()); }
   TileKey root() const { return {levels() - 1, 0, 0}; }
   bool contains(const TileKey& k) const;

@@ -2,13 +2,16 @@
 // How many segments each block of 8 x 8 cells of each drawn tile needs along a side so that its mesh keeps to the
 // pixel error: 1, 2, 4 or 8. With the block's errors (tile_finish.comp) and the depth of its nearest point. Bit
 // kOut: the block is out of sight. The published choices (Yusov and Shevtsov, section 5), kept to show what the
-// guarantee costs: the middle of a block instead of its nearest point, and no more than its mesh's own error.
+// guarantee costs: the middle of a block instead of its nearest point, and the error of a tile's own
+// vertices alone.
 #extension GL_GOOGLE_include_directive : require
 #include "terrain.glsl"
 
 layout(local_size_x = 64) in;  // the blocks of a tile
 
-layout(binding = 3) uniform samplerBuffer blocks;  // two texels a block: errors by simplification; lowest, highest
+layout(binding = 3) uniform samplerBuffer blocks;  // two texels a block, metres: errors when every 2nd, 4th,
+                                                   // 8th vertex is kept, lowest, highest, and those errors as published
+                                                   // in the other three places
 layout(binding = 4) writeonly buffer Factors { uint factors[]; };
 layout(push_constant) uniform Push { uint first; } push;
 
@@ -22,7 +25,7 @@ float largest_along(vec3 n, vec3 low, vec3 high) {
 void main() {
   const int d = int(gl_WorkGroupID.x + push.first), b = int(gl_LocalInvocationID.x);
   const Draw draw = draw_at(d);
-  const vec4 error = texelFetch(blocks, (draw.slot * 64 + b) * 2);
+  const vec4 errors = texelFetch(blocks, (draw.slot * 64 + b) * 2);
   const vec4 range = texelFetch(blocks, (draw.slot * 64 + b) * 2 + 1);
   const ivec2 at = ivec2(b % kBlocks, b / kBlocks) * (2 * kBlockCells);
   const vec2 low = vec2(draw.first + at * draw.stride) * frame.eye.w - frame.eye.xy;
@@ -36,12 +39,13 @@ void main() {
   seen = seen && largest_along(frame.axis.xyz, bottom, top) > 0;
   const bool published = frame.detail.w != 0;
   const float nearest = published ? dot(frame.axis.xyz, 0.5 * (bottom + top)) : depth;
+  const vec3 error = published ? vec3(errors.w, range.zw) : errors.xyz;
   uint segments = 8;
   if (nearest > frame.axis.w) {
     const float allowed = nearest / frame.detail.x - (published ? 0.0 : facts_at(d).x);
-    if (error.w <= allowed) segments = 1;
-    else if (error.z <= allowed) segments = 2;
-    else if (error.y <= allowed) segments = 4;
+    if (error.z <= allowed) segments = 1;
+    else if (error.y <= allowed) segments = 2;
+    else if (error.x <= allowed) segments = 4;
   }
   factors[d * 64 + b] = segments | (seen ? 0u : kOut);
 }

@@ -55,6 +55,24 @@ float largest_span(int base, ivec2 block, int size) {
   return worst;
 }
 
+// As published (Yusov and Shevtsov, section 5): the tile's own vertices against the triangles of a simplified cell.
+float published(int base, ivec2 block, int size) {
+  float worst = 0;
+  for (int r = 0; r < kBlockSamples; r += size)
+    for (int c = 0; c < kBlockSamples; c += size) {
+      const ivec2 from = block + ivec2(c, r);
+      const float a = height_at(base, from), b = height_at(base, from + ivec2(size, 0));
+      const float d = height_at(base, from + ivec2(0, size)), e = height_at(base, from + ivec2(size));
+      for (int y = 0; y <= size; y += 2)
+        for (int x = 0; x <= size; x += 2) {
+          const vec2 t = vec2(x, y) / float(size);
+          const float h = t.x >= t.y ? a + t.x * (b - a) + t.y * (e - b) : a + t.y * (d - a) + t.x * (e - d);
+          worst = max(worst, abs(height_at(base, from + ivec2(x, y)) - h));
+        }
+    }
+  return worst;
+}
+
 void measure(int base, int bound_base, int slot, int b) {
   const ivec2 block = ivec2(b % 8, b / 8) * kBlockSamples;
   float low = kNothing, high = -kNothing, bound = 0;
@@ -75,12 +93,14 @@ void measure(int base, int bound_base, int slot, int b) {
     }
   const float between = push.between * (bend.x + bend.y);
   vec4 error = vec4(kNothing);
+  vec3 own = vec3(kNothing);
   if (!holes) {
+    for (int d = 0; d < 3; ++d) own[d] = published(base, block, 4 << d);
     for (int d = 0; d < 4; ++d) error[d] = between + largest_span(base, block, 2 << d);
     for (int d = 1; d < 4; ++d) error[d] = max(error[d], error[d - 1]);
   }
-  blocks[(slot * 64 + b) * 2] = error;
-  blocks[(slot * 64 + b) * 2 + 1] = vec4(low + push.shift - between, high + push.shift + between, 0, 0);
+  blocks[(slot * 64 + b) * 2] = vec4(error.yzw, own.x);
+  blocks[(slot * 64 + b) * 2 + 1] = vec4(low + push.shift - between, high + push.shift + between, own.yz);
   tile_facts[b][0] = low - between, tile_facts[b][1] = high + between;
   tile_facts[b][2] = holes ? 0 : error.x, tile_facts[b][3] = bound;
   tile_facts[b][4] = holes ? 1 : 0, tile_facts[b][5] = low <= high ? 1 : 0;

@@ -190,6 +190,7 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
       [&](const vk::Frame& submission, std::size_t first, std::size_t n) {
         const auto begun = std::chrono::steady_clock::now();
         run_finish(submission, to.subspan(first, n));
+        ++counts.dispatches;
         for (std::size_t k = 0; k < n; ++k) {
           const TileKey& key = tiles[first + k];
           const bool improvable =

@@ -17,6 +17,7 @@ struct TileStore;
 
 struct TileMakerCounts {
   std::uint64_t tiles = 0, patches = 0, bytes = 0;  ///< made; sent to the card
+  std::uint64_t dispatches = 0;                     ///< of tile_finish.comp
   BlendCounts blended;                              ///< of all samples of the tiles made
   double extract_ms = 0, send_ms = 0, blend_ms = 0, finish_ms = 0;
 };

@@ -1,0 +1,99 @@
+#include "render/tile_supply.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "render/vulkan/tile_store_impl.h"
+
+namespace patchwork {
+
+namespace {
+
+double ms_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+void note_made(const TileMakerCounts& before, const TileMakerCounts& after, FrameStats& stats) {
+  stats.tiles_made = after.tiles - before.tiles, stats.patches_sent = after.patches - before.patches;
+  stats.bytes_up = after.bytes - before.bytes, stats.dispatches = after.dispatches - before.dispatches;
+  stats.extract_ms = after.extract_ms - before.extract_ms, stats.send_ms = after.send_ms - before.send_ms;
+  stats.blend_ms = after.blend_ms - before.blend_ms, stats.finish_ms = after.finish_ms - before.finish_ms;
+  stats.blended = after.blended;
+  stats.blended.points -= before.blended.points;
+  stats.blended.contributions -= before.blended.contributions;
+}
+
+}  // namespace
+
+TileSupply::TileSupply(std::shared_ptr<Device> device, const Database& db, const TileLattice& lattice,
+                       vk::TileStore& store, double base, const RendererOptions& options)
+    : lattice_(lattice),
+      options_(options),
+      cache_(store.slots, options.policy),
+      maker_(std::move(device), db, lattice, store, base, options.smoothness, options.memory / 2),
+      most_tiles_(store.slots * 2 / 3) {
+  if (options.realtime)
+    fetcher_ = std::make_unique<TileFetcher>(
+        options.workers, [&db, &lattice](const TileKey& k) { TileMaker::prefetch(db, lattice, k); });
+}
+
+void TileSupply::select(const Frustum& frustum, FrameStats& stats) {
+  const auto start = std::chrono::steady_clock::now();
+  select_tiles(lattice_, frustum, {options_.pixel_error, most_tiles_}, cache_, selection_);
+  wanted_.clear();
+  for (const Selection::Wanted& w : selection_.wanted) wanted_.push_back(w.key);
+  stats.select_ms += ms_since(start);
+}
+
+// Level by level, the coarsest first; false if nothing could be made.
+bool TileSupply::make(std::vector<TileKey> tiles) {
+  std::stable_sort(tiles.begin(), tiles.end(),
+                   [](const TileKey& a, const TileKey& b) { return a.level > b.level; });
+  std::size_t made = 0;
+  for (auto from = tiles.begin(); from != tiles.end();) {
+    const auto to = std::find_if(from, tiles.end(), [&](const TileKey& k) { return k.level != from->level; });
+    for (const TileMaker::Made& m : maker_.make({from, to}, [&] { return cache_.take_slot(); }))
+      cache_.put(m.key, m.facts, m.slot), ++made;
+    from = to;
+  }
+  return made > 0;
+}
+
+// As many as the time allows, one at least; the root is awaited, because nothing could be drawn without it.
+void TileSupply::make_fetched() {
+  if (!wanted_.empty() && wanted_.front() == lattice_.root()) {
+    make({lattice_.root()});
+    return;
+  }
+  const auto most = std::size_t(std::max(1.0, options_.make_ms / ms_a_tile_));
+  const std::vector<TileKey> fetched = fetcher_->take(wanted_, most);
+  if (fetched.empty()) return;
+  const auto start = std::chrono::steady_clock::now();
+  make(fetched);
+  ms_a_tile_ += 0.2 * (ms_since(start) / double(fetched.size()) - ms_a_tile_);
+}
+
+const Selection& TileSupply::update(const Frustum& frustum, FrameStats& stats) {
+  const TileMakerCounts before = maker_.counts();
+  cache_.begin_frame();
+  select(frustum, stats);
+  if (fetcher_) {
+    fetcher_->want(wanted_);
+    make_fetched();
+    if (maker_.counts().tiles != before.tiles || selection_.drawn.empty()) select(frustum, stats);
+  } else {
+    while (!wanted_.empty() && make(wanted_)) select(frustum, stats);
+  }
+  note_made(before, maker_.counts(), stats);
+  stats.tiles_wanted = selection_.wanted.size(), stats.pixels_reached = selection_.pixels;
+  return selection_;
+}
+
+void TileSupply::release(bool moved, const std::vector<Extent>& changed, bool another_lattice) {
+  if (moved) maker_.restart();
+  if (another_lattice) cache_.clear();
+  for (const Extent& e : changed) cache_.invalidate(lattice_, e);
+  if (fetcher_) fetcher_->release(moved);
+}
+
+}  // namespace patchwork

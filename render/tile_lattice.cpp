@@ -91,7 +91,7 @@ TileLattice TileLattice::over(const Database& db) {
   // twice the error of the level below.
   t.errors_.assign(std::size_t(levels), 0);
   for (int l = kFiner + 1; l < levels; ++l) {
-    auto& own = bottoms[std::size_t(l)];
+    auto& own = bottoms[std::size_t(l - 1)];
     const double below = t.errors_[std::size_t(l - 1)];
     t.errors_[std::size_t(l)] = own.empty() ? 2 * below : std::max(below, upper_quartile(own));
   }

@@ -124,7 +124,7 @@ struct Renderer::Impl {
     commands.submit(), commands.wait();
     const std::vector<double> ms = timer.intervals();
     stats.factors_ms = ms[0], stats.draw_ms = ms[1];
-    stats.dispatches += terrain.draws() > 0, stats.draws = terrain.draws();
+    stats.dispatches += terrain.draws() > 0 ? 2 : 0, stats.draws = terrain.draws();
     if (counter)
       card.check(vkGetQueryPoolResults(card.get(), counter.get(), 0, 1, 8, &stats.triangles, 8,
                                        VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
@@ -207,6 +207,7 @@ bool Renderer::refresh(Database& db) {
   return moved;
 }
 
+Renderer::Drawn Renderer::drawn() const { return {impl_->store, impl_->block, impl_->draws}; }
 const TileCache& Renderer::cache() const { return impl_->supply.cache(); }
 const TileLattice& Renderer::lattice() const { return impl_->lattice; }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,12 @@
 #include "render/tile_cache.h"
 
 namespace patchwork {
+
+struct TileDraw;
+namespace vk {
+struct FrameBlock;
+struct TileStore;
+}  // namespace vk
 
 struct RendererOptions {
   int width = 1280, height = 720;               ///< pixels
@@ -63,6 +70,13 @@ class Renderer {
   /// Moves the database that it draws to its newest state; false if it is in it. Tiles that changes touch are
   /// made anew, all others stay as they are. REQUIRES: `db` is the constructor's.
   bool refresh(Database& db);
+  /// What was drawn last, for those who draw it in another way.
+  struct Drawn {
+    const vk::TileStore& store;
+    const vk::FrameBlock& frame;
+    std::span<const TileDraw> draws;
+  };
+  Drawn drawn() const;
   const TileCache& cache() const;
   const TileLattice& lattice() const;
 

@@ -13,7 +13,6 @@ layout(binding = 3) uniform samplerBuffer blocks;  // two texels a block, metres
                                                    // 8th vertex is kept, lowest, highest, and those errors as published
                                                    // in the other three places
 layout(binding = 4) writeonly buffer Factors { uint factors[]; };
-layout(push_constant) uniform Push { uint first; } push;
 
 const uint kOut = 256u;
 
@@ -23,7 +22,7 @@ float largest_along(vec3 n, vec3 low, vec3 high) {
 }
 
 void main() {
-  const int d = int(gl_WorkGroupID.x + push.first), b = int(gl_LocalInvocationID.x);
+  const int d = int(gl_WorkGroupID.x), b = int(gl_LocalInvocationID.x);
   const Draw draw = draw_at(d);
   const vec4 errors = texelFetch(blocks, (draw.slot * 64 + b) * 2);
   const vec4 range = texelFetch(blocks, (draw.slot * 64 + b) * 2 + 1);

@@ -11,6 +11,9 @@ constexpr std::uint32_t kTileFinish[] = {
 constexpr std::uint32_t kFactors[] = {
 #include "factors.comp.inc"
 };
+constexpr std::uint32_t kEdges[] = {
+#include "edges.comp.inc"
+};
 constexpr std::uint32_t kTerrainVert[] = {
 #include "terrain.vert.inc"
 };
@@ -28,6 +31,7 @@ constexpr std::uint32_t kTerrainFrag[] = {
 
 std::span<const std::uint32_t> tile_finish() { return kTileFinish; }
 std::span<const std::uint32_t> factors() { return kFactors; }
+std::span<const std::uint32_t> edges() { return kEdges; }
 std::span<const std::uint32_t> terrain_vert() { return kTerrainVert; }
 std::span<const std::uint32_t> terrain_tesc() { return kTerrainTesc; }
 std::span<const std::uint32_t> terrain_tese() { return kTerrainTese; }

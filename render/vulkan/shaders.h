@@ -8,6 +8,7 @@ namespace patchwork::shaders {
 
 std::span<const std::uint32_t> tile_finish();
 std::span<const std::uint32_t> factors();
+std::span<const std::uint32_t> edges();
 std::span<const std::uint32_t> terrain_vert();
 std::span<const std::uint32_t> terrain_tesc();
 std::span<const std::uint32_t> terrain_tese();

@@ -23,28 +23,23 @@ Draw draw_at(int d) {
 }
 vec4 facts_at(int d) { return uintBitsToFloat(texelFetch(draws, d * kDraw + 9)); }
 
-// The texel of the vertex at position `t` (half cells, 0 to 128) of side s of a tile.
-int seam(int d, int s, int t) {
-  if (t == 0 || t == 2 * kCells) {
-    const int along = t == 0 ? 0 : 1;
-    const int corner = s < 2 ? s + 2 * along : along + 2 * (s - 2);
-    return int(texelFetch(draws, d * kDraw + 5)[corner]);
-  }
-  if (t == kCells) return int(texelFetch(draws, d * kDraw + 6)[s]);
-  const uvec4 side = texelFetch(draws, d * kDraw + 1 + s);
-  const int later = t > kCells ? 1 : 0, past = t - later * kCells;
-  const bool fine = (side.w >> later & 1u) != 0;
-  return int(later == 1 ? side.y : side.x) + (fine ? past : past / 2) * int(side.z);
-}
-
-// The texel of the vertex at half cells `at` of a tile; inside the tile both are even.
+// The texel of the vertex at half cells `at` of a tile; inside the tile both are even. One way for all: lavapipe
+// runs both sides of every branch.
 int texel_of(int d, int slot, ivec2 at) {
   const int last = 2 * kCells;
-  if (at.x == 0) return seam(d, 0, at.y);
-  if (at.x == last) return seam(d, 1, at.y);
-  if (at.y == 0) return seam(d, 2, at.x);
-  if (at.y == last) return seam(d, 3, at.x);
-  return (slot * kVertices + at.y / 2) * kVertices + at.x / 2;
+  const bool low_x = at.x == 0, high_x = at.x == last, low_y = at.y == 0, high_y = at.y == last;
+  const int s = low_x ? 0 : high_x ? 1 : low_y ? 2 : 3, t = s < 2 ? at.y : at.x;
+  const bool corner = (low_x || high_x) && (low_y || high_y);
+  // The side's record, but for corners and middles the record of all four of these.
+  const int record = corner ? 5 : t == kCells ? 6 : 1 + s;
+  const uvec4 found = texelFetch(draws, d * kDraw + record);
+  const int later = t > kCells ? 1 : 0, past = t - later * kCells;
+  const bool fine = (found.w >> later & 1u) != 0;
+  const int on_side = int(later == 1 ? found.y : found.x) + (fine ? past : past / 2) * int(found.z);
+  const int which = corner ? (high_x ? 1 : 0) + (high_y ? 2 : 0) : s;
+  const int border = record >= 5 ? int(found[which]) : on_side;
+  const int inside = (slot * kVertices + at.y / 2) * kVertices + at.x / 2;
+  return low_x || high_x || low_y || high_y ? border : inside;
 }
 
 // The same bits for every tile that has the vertex: whole half cells, then one rounding.

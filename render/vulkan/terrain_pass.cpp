@@ -16,6 +16,8 @@ constexpr VkDescriptorType kFactorTypes[] = {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 
 // terrain.glsl, terrain.tesc, terrain.frag
 constexpr VkDescriptorType kTypes[] = {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels,
                                        VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER};
+constexpr VkBufferUsageFlags kWordTexels =
+    VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT;
 constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_TESSELLATION_CONTROL_BIT |
                                        VK_SHADER_STAGE_TESSELLATION_EVALUATION_BIT |
                                        VK_SHADER_STAGE_FRAGMENT_BIT;
@@ -35,20 +37,23 @@ OwnedPipeline terrain_pipeline(const Bindings& bindings, VkRenderPass pass, bool
 TerrainPass::TerrainPass(const Device::Impl& device, const TileStore& store, VkRenderPass pass,
                          std::uint32_t most_tiles)
     : device_(device),
-      factor_bindings_(device, kFactorTypes, 4),
+      factor_bindings_(device, kFactorTypes, 0),
       bindings_(device, kTypes, 0, kStages),
       factors_pipeline_(make_pipeline(factor_bindings_, shaders::factors(), {})),
+      edges_pipeline_(make_pipeline(factor_bindings_, shaders::edges(), {})),
       pipelines_{terrain_pipeline(bindings_, pass, false), terrain_pipeline(bindings_, pass, true)},
       factor_sets_(factor_bindings_.make_set(factor_set_)),
+      edge_sets_(factor_bindings_.make_set(edge_set_)),
       sets_(bindings_.make_set(set_)),
       frame_(device, sizeof(FrameBlock), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, Where::upload),
       draws_(device, most_tiles * sizeof(TileDraw), VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT, Where::upload),
-      factors_(device, most_tiles * TileStore::kBlocks * 4,
-               VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT, Where::card),
+      factors_(device, most_tiles * TileStore::kBlocks * 4, kWordTexels, Where::card),
+      edges_(device, most_tiles * TileStore::kBlocks * 4, kWordTexels, Where::card),
       calls_(device, most_tiles * sizeof(VkDrawIndirectCommand), VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT,
              Where::upload),
       draw_texels_(texels(device, draws_, VK_FORMAT_R32G32B32A32_UINT)),
-      factor_texels_(texels(device, factors_, VK_FORMAT_R32_UINT)) {
+      factor_texels_(texels(device, factors_, VK_FORMAT_R32_UINT)),
+      edge_texels_(texels(device, edges_, VK_FORMAT_R32_UINT)) {
   bind_all(store);
   // Each draw is a tile of its own: 64 blocks, the instance says which tile. One that tessellates more than
   // 65 536 vertices is drawn wrongly by llvmpipe; these have at most 64 * 9 * 17.
@@ -57,11 +62,14 @@ TerrainPass::TerrainPass(const Device::Impl& device, const TileStore& store, VkR
 }
 
 void TerrainPass::bind_all(const TileStore& store) {
-  factor_bindings_.bind(factor_set_, 0, frame_), bindings_.bind(set_, 0, frame_);
-  factor_bindings_.bind(factor_set_, 1, draw_texels_), bindings_.bind(set_, 1, draw_texels_);
-  factor_bindings_.bind(factor_set_, 2, store.height_texels), bindings_.bind(set_, 2, store.height_texels);
-  factor_bindings_.bind(factor_set_, 3, store.block_texels), bindings_.bind(set_, 3, factor_texels_);
-  factor_bindings_.bind(factor_set_, 4, factors_);
+  for (const VkDescriptorSet set : {factor_set_, edge_set_}) {
+    factor_bindings_.bind(set, 0, frame_), factor_bindings_.bind(set, 1, draw_texels_);
+    factor_bindings_.bind(set, 2, store.height_texels);
+  }
+  factor_bindings_.bind(factor_set_, 3, store.block_texels), factor_bindings_.bind(factor_set_, 4, factors_);
+  factor_bindings_.bind(edge_set_, 3, factor_texels_), factor_bindings_.bind(edge_set_, 4, edges_);
+  bindings_.bind(set_, 0, frame_), bindings_.bind(set_, 1, draw_texels_);
+  bindings_.bind(set_, 2, store.height_texels), bindings_.bind(set_, 3, edge_texels_);
   bindings_.bind(set_, 4, store.sampler.get(), store.slopes.view(), VK_IMAGE_LAYOUT_GENERAL);
 }
 
@@ -81,13 +89,15 @@ void TerrainPass::set(const FrameBlock& frame, std::span<const TileDraw> draws) 
 
 void TerrainPass::record_factors(VkCommandBuffer commands) const {
   if (this->draws() == 0) return;
-  const std::uint32_t first = 0;
-  vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, factors_pipeline_.get());
-  vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, factor_bindings_.layout(), 0, 1,
-                          &factor_set_, 0, nullptr);
-  vkCmdPushConstants(commands, factor_bindings_.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, 4, &first);
-  vkCmdDispatch(commands, this->draws(), 1, 1);
-  barrier(commands);
+  const auto run = [&](const OwnedPipeline& pipeline, VkDescriptorSet set) {
+    vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline.get());
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, factor_bindings_.layout(), 0, 1, &set,
+                            0, nullptr);
+    vkCmdDispatch(commands, this->draws(), 1, 1);
+    barrier(commands);
+  };
+  run(factors_pipeline_, factor_set_);
+  run(edges_pipeline_, edge_set_);
 }
 
 void TerrainPass::record_draws(VkCommandBuffer commands) const {

@@ -1,4 +1,4 @@
-// Draws tiles: one dispatch says how finely each block is tessellated, one indirect call draws all of them.
+// Draws tiles: two dispatches say how finely each block is tessellated, one indirect call draws all of them.
 #pragma once
 
 #include <array>
@@ -37,13 +37,13 @@ class TerrainPass {
  private:
   void bind_all(const TileStore& store);
   const Device::Impl& device_;
-  Bindings factor_bindings_, bindings_;
-  OwnedPipeline factors_pipeline_;
+  Bindings factor_bindings_, bindings_;  // of the dispatches; of the draws
+  OwnedPipeline factors_pipeline_, edges_pipeline_;
   std::array<OwnedPipeline, 2> pipelines_;  // without and with holes
-  VkDescriptorSet factor_set_ = VK_NULL_HANDLE, set_ = VK_NULL_HANDLE;
-  OwnedSets factor_sets_, sets_;
-  Buffer frame_, draws_, factors_, calls_;
-  OwnedView draw_texels_, factor_texels_;
+  VkDescriptorSet factor_set_ = VK_NULL_HANDLE, edge_set_ = VK_NULL_HANDLE, set_ = VK_NULL_HANDLE;
+  OwnedSets factor_sets_, edge_sets_, sets_;
+  Buffer frame_, draws_, factors_, edges_, calls_;
+  OwnedView draw_texels_, factor_texels_, edge_texels_;
   std::uint32_t solid_ = 0, holed_ = 0;
   std::size_t bytes_set_ = 0;
 };

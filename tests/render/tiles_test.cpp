@@ -249,7 +249,7 @@ TEST(EdgeSplit, WhoeverSharesAVertexReadsTheSameTexel) {
   EXPECT_GT(finer, 1000) << "levels meet";
 }
 
-// terrain.tesc in C++: the segments of each border edge, in the terms of its tile, from what blocks need.
+// edges.comp in C++: the segments of each border edge, in the terms of its tile, from what blocks need.
 int border_need(const std::vector<TileDraw>& draws, const std::vector<std::array<int, 64>>& need,
                 std::size_t d, int s, int along) {
   const auto at = [&](std::size_t draw, int side, int k) {

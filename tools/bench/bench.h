@@ -15,7 +15,7 @@ struct BenchOptions {
   int runs = 5;      ///< measured; one more of each side comes before to warm up
   int threads = 2;   ///< given to both sides
   int seconds = 60;  ///< that readers are kept busy
-  std::string file;  ///< of heights for `codec` and `blend`; empty: a made terrain
+  std::string file;  ///< of heights for `codec`, `blend` and `render`; empty: a made terrain
   std::string keep;  ///< folder to work in and to leave; empty: a temporary one
 };
 
@@ -40,6 +40,7 @@ std::vector<Work> bench_flight(const BenchOptions& options);
 std::vector<Work> bench_import(const BenchOptions& options);
 std::vector<Work> bench_query(const BenchOptions& options);
 std::vector<Work> bench_readers(const BenchOptions& options);
+std::vector<Work> bench_render(const BenchOptions& options);
 std::vector<Work> bench_resample(const BenchOptions& options);
 std::vector<Work> bench_update(const BenchOptions& options);
 

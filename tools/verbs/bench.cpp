@@ -10,9 +10,9 @@ namespace patchwork::cli {
 namespace {
 
 const std::map<std::string, std::vector<Work> (*)(const BenchOptions&)> kBenches{
-    {"blend", &bench_blend},       {"codec", &bench_codec},  {"flight", &bench_flight},
-    {"import", &bench_import},     {"query", &bench_query},  {"readers", &bench_readers},
-    {"resample", &bench_resample}, {"update", &bench_update}};
+    {"blend", &bench_blend},   {"codec", &bench_codec},       {"flight", &bench_flight},
+    {"import", &bench_import}, {"query", &bench_query},       {"readers", &bench_readers},
+    {"render", &bench_render}, {"resample", &bench_resample}, {"update", &bench_update}};
 
 struct Options {
   std::string name;
@@ -67,7 +67,8 @@ void add_bench(CLI::App& app, Common& common) {
   auto o = std::make_shared<Options>();
   CLI::App* v = verb(app, common, "bench", "the project's own benchmarks, with peers beside it");
   v->add_option("NAME", o->name, "what to measure")->required()->check(CLI::IsMember(names()));
-  v->add_option("--file", o->bench.file, "heights to use: to code, integers (codec), or to evaluate (blend)")
+  v->add_option("--file", o->bench.file,
+                "heights to use: to code, integers (codec), to evaluate (blend), to fly over (render)")
       ->check(CLI::ExistingFile);
   v->add_option("--seconds", o->bench.seconds, "how long readers are kept busy (readers only)")
       ->check(CLI::Range(1, 3600));

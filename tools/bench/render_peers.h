@@ -1,0 +1,31 @@
+// The same view drawn in other ways: the whole grid as one mesh, tiles without tessellation, bare shading.
+#pragma once
+
+#include <memory>
+
+#include "render/renderer.h"
+
+namespace patchwork::cli {
+
+/// Each draws one frame and returns its milliseconds on the card. Throws Error: no memory.
+class RenderPeers {
+ public:
+  /// `grid` of `db` is the mesh; none where it is null.
+  RenderPeers(std::shared_ptr<Device> device, const Database& db, const Grid* grid, int width, int height);
+  ~RenderPeers();
+
+  double full_mesh(const Camera& camera);
+  std::size_t mesh_triangles() const;
+  /// The tiles that `renderer` drew last, each as 64 x 64 cells; as chunks are drawn, but for their skirts.
+  double chunked(const Renderer& renderer);
+  /// A full-screen triangle with the same shading; and so many plain triangles of those tiles, the same share
+  /// of each.
+  double full_screen(const Renderer& renderer);
+  double plain(const Renderer& renderer, std::size_t triangles);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace patchwork::cli

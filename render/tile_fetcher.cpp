@@ -72,11 +72,10 @@ bool TileFetcher::hold() {
   return running_.empty();
 }
 
-void TileFetcher::release(bool forget) {
+void TileFetcher::release() {
   {
     const std::scoped_lock lock(mutex_);
     held_ = false;
-    if (forget) ready_.clear(), queue_.clear();
   }
   more_.notify_all();
 }

@@ -30,8 +30,7 @@ class TileFetcher {
   /// No worker begins anything until release(). True if none reads any more: the database may move on; else
   /// ask again a frame later.
   bool hold();
-  /// `forget`: what was fetched is of a state that is gone.
-  void release(bool forget);
+  void release();
 
  private:
   void work();

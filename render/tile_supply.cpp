@@ -86,6 +86,10 @@ const Selection& TileSupply::update(const Frustum& frustum, FrameStats& stats) {
   }
   note_made(before, maker_.counts(), stats);
   stats.tiles_wanted = selection_.wanted.size(), stats.pixels_reached = selection_.pixels;
+  for (const std::uint32_t k : selection_.drawn) {
+    const Selection::Leaf& leaf = selection_.leaves[k];
+    stats.tiles_coarse += leaf.pixels > options_.pixel_error && leaf.key.level > 0;
+  }
   return selection_;
 }
 
@@ -93,7 +97,7 @@ void TileSupply::release(bool moved, const std::vector<Extent>& changed, bool an
   if (moved) maker_.restart();
   if (another_lattice) cache_.clear();
   for (const Extent& e : changed) cache_.invalidate(lattice_, e);
-  if (fetcher_) fetcher_->release(moved);
+  if (fetcher_) fetcher_->release();  // what was read stays in the database's cache
 }
 
 }  // namespace patchwork

@@ -232,6 +232,10 @@ VulkanBlend::VulkanBlend(std::shared_ptr<Device> device, const Database& db, std
 VulkanBlend::~VulkanBlend() = default;
 
 void VulkanBlend::change(std::span<const PatchId> patches) { impl_->hold(patches); }
+void VulkanBlend::restart() {
+  impl_->remember_grids();
+  impl_->hold({});
+}
 const Device& VulkanBlend::device() const { return *impl_->device; }
 const PatchPool& VulkanBlend::pool() const { return *impl_->pool; }
 BlockShares VulkanBlend::shares() const { return impl_->shares; }

@@ -61,6 +61,8 @@ class VulkanBlend : public Evaluator {
 
   /// The next cut: what both have in common is not sent again.
   void change(std::span<const PatchId> patches);
+  /// The database moved to another state: nothing is resident any more. Cheaper than another object.
+  void restart();
 
   /// As Blend's. REQUIRES: out.patch is empty.
   BlendCounts at_points(std::span<const double> x, std::span<const double> y,

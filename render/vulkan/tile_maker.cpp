@@ -257,7 +257,9 @@ void TileMaker::prefetch(const Database& db, const TileLattice& lattice, const T
   for (const PatchId id : x.patches) db.surface(id);
 }
 
-void TileMaker::restart() { impl_->blend.reset(); }
+void TileMaker::restart() {
+  if (impl_->blend) impl_->blend->restart();
+}
 const TileMakerCounts& TileMaker::counts() const { return impl_->counts; }
 
 }  // namespace patchwork

@@ -42,6 +42,7 @@ std::vector<Work> bench_query(const BenchOptions& options);
 std::vector<Work> bench_readers(const BenchOptions& options);
 std::vector<Work> bench_render(const BenchOptions& options);
 std::vector<Work> bench_resample(const BenchOptions& options);
+std::vector<Work> bench_tiles(const BenchOptions& options);
 std::vector<Work> bench_update(const BenchOptions& options);
 
 /// The folder of a benchmark's files: removed with all in it, unless the options say where to keep it.

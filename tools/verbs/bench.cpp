@@ -12,7 +12,8 @@ namespace {
 const std::map<std::string, std::vector<Work> (*)(const BenchOptions&)> kBenches{
     {"blend", &bench_blend},   {"codec", &bench_codec},       {"flight", &bench_flight},
     {"import", &bench_import}, {"query", &bench_query},       {"readers", &bench_readers},
-    {"render", &bench_render}, {"resample", &bench_resample}, {"update", &bench_update}};
+    {"render", &bench_render}, {"resample", &bench_resample}, {"tiles", &bench_tiles},
+    {"update", &bench_update}};
 
 struct Options {
   std::string name;

@@ -1,0 +1,192 @@
+// Tiles in flight: which cache policy costs least, and how fast a camera may fly at the error it asked for.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <thread>
+
+#include "render/renderer.h"
+#include "tools/bench/bench.h"
+#include "tools/bench/process.h"
+
+namespace patchwork::cli {
+
+namespace {
+
+constexpr int kWidth = 640, kHeight = 360;
+constexpr double kPixelError = 2;
+constexpr int kPolicyFrames = 120;
+constexpr double kEnough = 0.99;  // share of tiles at the asked error
+constexpr double kFlightSeconds = 4, kSettleSeconds = 2;
+constexpr double kSlowest = 12.5;  // metres a second; doubled while it goes well
+constexpr int kDoublings = 12;
+
+using Clock = std::chrono::steady_clock;
+
+// Where the camera is on a path of a kind, `way` metres after its beginning.
+class Path {
+ public:
+  Path(const Database& db, std::string kind) : kind_(std::move(kind)), extent_(db.extent()) {
+    for (const Grid& g : db.grids()) top_ = std::max(top_, g.info.highest);
+    side_ = std::min(extent_.xmax - extent_.xmin, extent_.ymax - extent_.ymin);
+  }
+  Camera at(double way) const {
+    const double x = 0.5 * (extent_.xmin + extent_.xmax), y = 0.5 * (extent_.ymin + extent_.ymax);
+    const double radius = 0.25 * side_;
+    Point3 eye{x, y, top_ + 0.02 * side_};
+    double heading = 0;
+    if (kind_ == "circle") {
+      const double a = way / radius;
+      eye.x += radius * std::cos(a), eye.y += radius * std::sin(a), heading = -a;
+    } else if (kind_ == "turn") {
+      heading = way / radius;
+    } else {  // to and fro along the diagonal's direction
+      const double lap = 0.7 * side_, phase = std::fmod(way, 2 * lap),
+                   s = phase < lap ? phase : 2 * lap - phase;
+      eye.y += s - 0.5 * lap, heading = phase < lap ? 0 : std::numbers::pi;
+    }
+    return {eye, {eye.x + std::sin(heading), eye.y + std::cos(heading), eye.z - 0.25}, 60, kWidth, kHeight};
+  }
+  double length() const { return kind_ == "straight" ? 1.4 * side_ : 0.5 * std::numbers::pi * side_; }
+
+ private:
+  std::string kind_;
+  Extent extent_;
+  double side_ = 0, top_ = 0;
+};
+
+const std::pair<TilePolicy, const char*> kPolicies[] = {{TilePolicy::lru, "least recently used"},
+                                                        {TilePolicy::first, "first available"},
+                                                        {TilePolicy::lru_error, "smallest error"}};
+
+// One way along the path with a pool that holds little more than a view.
+Work policies(const std::shared_ptr<Device>& device, const Database& db, const std::string& kind) {
+  const Path path(db, kind);
+  std::vector<Spread> times;
+  Json answer = Json::object();
+  for (const auto& [policy, name] : kPolicies) {
+    Renderer r(device, db,
+               {.width = kWidth,
+                .height = kHeight,
+                .pixel_error = kPixelError,
+                .memory = std::size_t{96} << 20,
+                .policy = policy});
+    std::vector<double> ms;
+    std::size_t made = 0;
+    double bookkeeping = 0;
+    for (int k = 0; k < kPolicyFrames; ++k) {
+      const FrameStats s = r.draw(path.at(path.length() * k / kPolicyFrames));
+      if (k == 0) continue;
+      ms.push_back(s.total_ms), made += s.tiles_made, bookkeeping += s.select_ms;
+    }
+    times.push_back(Spread::of(ms));
+    answer[name] = {
+        {"tiles_made", made}, {"evictions", r.cache().evictions()}, {"bookkeeping_ms", bookkeeping}};
+  }
+  Work w{"policy, " + kind, "ms a frame", true, times[0], {}, answer};
+  for (std::size_t p = 1; p < times.size(); ++p) w.peers.emplace_back(kPolicies[p].second, times[p]);
+  return w;
+}
+
+// Another process's surveys, that come and go while the camera flies.
+class Surveyors {
+ public:
+  Surveyors(const std::string& database, const std::string& survey)
+      : thread_([this, database, survey] {
+          while (!ends_) {
+            run_process({own_program("patchwork"), "import", database, survey, "--accuracy", "0.3", "--name",
+                         "coming", "--quiet"});
+            run_process({own_program("patchwork"), "remove", database, "coming", "--quiet"});
+          }
+        }) {}
+  ~Surveyors() {
+    ends_ = true;
+    thread_.join();
+  }
+
+ private:
+  std::atomic<bool> ends_ = false;
+  std::thread thread_;
+};
+
+struct Flown {
+  double share = 1, frame_ms = 0, worst_ms = 0;  // of tiles at the asked error; median, largest
+};
+
+Flown fly(Renderer& r, Database& db, const Path& path, double speed, double& way) {
+  std::size_t drawn = 0, coarse = 0;
+  std::vector<double> ms;
+  const auto start = Clock::now();
+  auto before = start;
+  for (;;) {
+    r.refresh(db);
+    const FrameStats s = r.draw(path.at(way));
+    const auto now = Clock::now();
+    way += speed * std::chrono::duration<double>(now - before).count(), before = now;
+    const double elapsed = std::chrono::duration<double>(now - start).count();
+    if (elapsed > kSettleSeconds) drawn += s.tiles_drawn, coarse += s.tiles_coarse, ms.push_back(s.total_ms);
+    if (elapsed > kSettleSeconds + kFlightSeconds) break;
+  }
+  const Spread spread = Spread::of(ms);
+  return {drawn > 0 ? 1 - double(coarse) / double(drawn) : 1, spread.median, spread.max};
+}
+
+Work speed(const std::shared_ptr<Device>& device, const std::string& file, int workers,
+           const std::string& survey) {
+  Database db = Database::open(file);
+  const Path path(db, "straight");
+  Renderer r(device, db,
+             {.width = kWidth,
+              .height = kHeight,
+              .pixel_error = kPixelError,
+              .realtime = true,
+              .make_ms = 12,
+              .workers = workers});
+  std::unique_ptr<Surveyors> surveyors;
+  if (!survey.empty()) surveyors = std::make_unique<Surveyors>(file, survey);
+  double way = 0, best = 0;
+  Json tried = Json::array();
+  for (int n = 0; n < kDoublings; ++n) {
+    const double metres = std::ldexp(kSlowest, n);
+    const Flown f = fly(r, db, path, metres, way);
+    tried.push_back(
+        {{"speed", metres}, {"share", f.share}, {"frame_ms", f.frame_ms}, {"worst_ms", f.worst_ms}});
+    if (f.share < kEnough) break;
+    best = metres;
+  }
+  return {fmt::format("speed, {} worker{}{}", workers, workers == 1 ? "" : "s",
+                      survey.empty() ? "" : ", surveys coming and going"),
+          "m/s",
+          false,
+          {best, best, best},
+          {},
+          {{"share_wanted", kEnough}, {"pixel_error", kPixelError}, {"tried", tried}}};
+}
+
+}  // namespace
+
+std::vector<Work> bench_tiles(const BenchOptions& o) {
+  const WorkFolder folder(o);
+  const std::string path = folder.path("tiles.pwk");
+  const double middle = 5.0 * (o.size - 1);
+  make_terrain(folder.path("terrain"),
+               {"--size", fmt::format("{}", o.size), "--type", "Int16", "--scale", "0.1", "--survey",
+                fmt::format("{},{},400,400,5,20,0.1", middle, middle)});
+  run_process({own_program("patchwork"), "import", path, folder.path("terrain/base.tif"), "--accuracy", "0.2",
+               "--quiet"});
+  const auto device = Device::open();
+  std::vector<Work> all;
+  {
+    const Database db = Database::open(path);
+    for (const char* kind : {"circle", "turn", "straight"}) all.push_back(policies(device, db, kind));
+  }
+  for (const int workers : {1, 2})
+    for (const bool surveyed : {false, true})
+      all.push_back(speed(device, path, workers, surveyed ? folder.path("terrain/survey_1.tif") : ""));
+  return all;
+}
+
+}  // namespace patchwork::cli

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "db/error.h"
+#include "query/cut.h"
 #include "render/tile_seams.h"
 #include "render/tile_supply.h"
 #include "render/vulkan/terrain_pass_impl.h"
@@ -39,6 +40,16 @@ void put_matrix(const glm::dmat4& m, float (&to)[16]) {
     for (int r = 0; r < 4; ++r) to[4 * c + r] = float(m[c][r]);
 }
 
+// What the effects look at of the options.
+Scene scene_of(const RendererOptions& o) {
+  Scene s;
+  s.width = o.width, s.height = o.height, s.smoothness = o.smoothness;
+  s.background = o.background, s.legend = o.legend, s.effects = o.effects;
+  return s;
+}
+
+bool knowing(const SceneEffects& e) { return e.error || e.source; }
+
 }  // namespace
 
 struct Renderer::Impl {
@@ -52,6 +63,7 @@ struct Renderer::Impl {
   TileSupply supply;
   vk::Target target;
   vk::TerrainPass terrain;
+  vk::FrameEffects effects;
   vk::Commands commands;
   vk::Timer timer;
   vk::OwnedQueries counter;
@@ -67,12 +79,13 @@ struct Renderer::Impl {
         card(drawing(*device)),
         lattice(TileLattice::over(db)),
         base(middle_height(db)),
-        store(card, vk::TileStore::slots_within(card, o.memory / 2)),
+        store(card, vk::TileStore::slots_within(card, o.memory / 2, knowing(o.effects)), knowing(o.effects)),
         supply(device, db, lattice, store, base, o),
         target(card, std::uint32_t(o.width), std::uint32_t(o.height)),
         terrain(card, store, target.pass(), supply.most_tiles()),
+        effects(card, db, scene_of(o)),
         commands(card),
-        timer(card, 3),
+        timer(card, 4),
         counter(make_counter()) {
     if (db.grids().empty()) throw Error(db.path(), "it holds no grid to draw");
   }
@@ -88,7 +101,7 @@ struct Renderer::Impl {
     return vk::OwnedQueries(card.get(), pool);
   }
 
-  vk::FrameBlock make_block(const Frustum& frustum) const {
+  vk::FrameBlock make_block(const Frustum& frustum, double curvature) const {
     vk::FrameBlock b{};
     put_matrix(projection(camera, kNear) * glm::dmat4(view_rotation(camera)), b.clip);
     for (int s = 0; s < 4; ++s)
@@ -101,7 +114,7 @@ struct Renderer::Impl {
     b.eye[2] = float(base - camera.eye.z), b.eye[3] = float(lattice.half_cell());
     // As published: pixels per unit of tangent, though a picture's corners show more of them.
     const double gamma = options.published ? camera.gamma() : frustum.gamma();
-    b.detail[0] = float(gamma / options.pixel_error), b.detail[1] = float(options.curvature);
+    b.detail[0] = float(gamma / options.pixel_error), b.detail[1] = float(curvature);
     b.detail[2] = float(gamma), b.detail[3] = options.published;
     return b;
   }
@@ -111,6 +124,12 @@ struct Renderer::Impl {
     timer.reset(c);
     timer.mark(c);
     if (counter) vkCmdResetQueryPool(c, counter.get(), 0, 1);
+    const std::size_t shadows = effects.shadow_dispatches(), skies = effects.sky_dispatches();
+    effects.record_maps(c);
+    stats.shadow_dispatches = effects.shadow_dispatches() - shadows;
+    stats.sky_dispatches = effects.sky_dispatches() - skies;
+    terrain.use(effects);
+    timer.mark(c);
     terrain.record_factors(c);
     timer.mark(c);
     const float background[4] = {float(options.background.r) / 255, float(options.background.g) / 255,
@@ -123,8 +142,9 @@ struct Renderer::Impl {
     timer.mark(c);
     commands.submit(), commands.wait();
     const std::vector<double> ms = timer.intervals();
-    stats.factors_ms = ms[0], stats.draw_ms = ms[1];
-    stats.dispatches += terrain.draws() > 0 ? 2 : 0, stats.draws = terrain.draws();
+    stats.light_ms = ms[0], stats.factors_ms = ms[1], stats.draw_ms = ms[2];
+    stats.dispatches += (terrain.draws() > 0 ? 2 : 0) + stats.shadow_dispatches + stats.sky_dispatches;
+    stats.draws = terrain.draws();
     if (counter)
       card.check(vkGetQueryPoolResults(card.get(), counter.get(), 0, 1, 8, &stats.triangles, 8,
                                        VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
@@ -136,6 +156,12 @@ struct Renderer::Impl {
     commands.submit(), commands.wait();
   }
 
+  // Of all terrain, seen or not: gates that hold for it hold for what is seen.
+  effects::SceneView scene_view() const {
+    const ViewCut all = over_terrain_of(db, {.eye = camera.eye, .look = camera.look});
+    return {camera, all.lowest, all.highest, all.far};
+  }
+
   FrameStats draw(const Camera& from);
 };
 
@@ -144,17 +170,22 @@ FrameStats Renderer::Impl::draw(const Camera& from) {
   FrameStats stats;
   stats.pixels_asked = options.pixel_error;
   camera = from, camera.width = options.width, camera.height = options.height;
-  const Frustum frustum(camera, options.curvature);
+  const effects::SceneView view = scene_view();
+  const double curvature = effects.curvature(view);
+  const Frustum frustum(camera, curvature);
   const Selection& selection = supply.update(frustum, stats);
   make_draws(lattice, selection, supply.cache(), {camera.eye.x, camera.eye.y}, draws);
-  const vk::FrameBlock now = make_block(frustum);
+  const vk::FrameBlock now = make_block(frustum, curvature);
   stats.tiles_drawn = draws.size();
+  std::vector<float> bounds;
   for (const std::uint32_t k : selection.drawn)
-    stats.bound_max = std::max(stats.bound_max, supply.cache().find(selection.leaves[k].key)->facts.bound);
+    bounds.push_back(float(supply.cache().find(selection.leaves[k].key)->facts.bound));
+  for (const float b : bounds) stats.bound_max = std::max(stats.bound_max, double(b));
+  const bool other_look = effects.prepare(view, bounds);
   // With the same input the picture is the one that is there.
-  if (!drawn || stats.tiles_made > 0 || now != block || draws != last_draws) {
+  if (!drawn || other_look || stats.tiles_made > 0 || now != block || draws != last_draws) {
     terrain.set(now, draws);
-    stats.bytes_up += terrain.bytes_set();
+    stats.bytes_up += terrain.bytes_set() + effects.bytes_set();
     block = now, last_draws = draws, drawn = true;
     submit(stats);
   }
@@ -174,7 +205,15 @@ Image Renderer::picture() const {
   const std::uint32_t* from = impl_->target.pixels();
   for (std::size_t k = 0; k < image.pixels.size(); ++k)
     image.pixels[k] = {std::uint8_t(from[k]), std::uint8_t(from[k] >> 8), std::uint8_t(from[k] >> 16)};
+  impl_->effects.draw_legend(image);
   return image;
+}
+
+void Renderer::change(const SceneEffects& to) {
+  if (knowing(to) && !impl_->store.knowledge)
+    throw Error("effects", "this renderer was made without overlays of bounds and sources");
+  impl_->options.effects = to;
+  impl_->effects.change(scene_of(impl_->options));
 }
 
 std::vector<float> Renderer::depth() const {
@@ -204,6 +243,7 @@ bool Renderer::refresh(Database& db) {
     if (another_lattice) impl_->lattice = TileLattice::over(db);
   }
   impl_->supply.release(moved, changed, another_lattice);
+  if (moved) impl_->effects.heights_changed();
   return moved;
 }
 

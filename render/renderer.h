@@ -10,6 +10,7 @@
 #include "blend/vulkan/device.h"
 #include "render/camera.h"
 #include "render/picture.h"
+#include "render/scene.h"
 #include "render/tile_cache.h"
 
 namespace patchwork {
@@ -31,14 +32,15 @@ struct RendererOptions {
   bool realtime = false;
   double make_ms = 8;
   int workers = 1;
-  bool published = false;  ///< tessellation as published, without the guarantee (vulkan/factors.comp)
-  double curvature = 0;  ///< metres by which the earth drops away, per square metre of distance in the plane
+  bool published = false;     ///< tessellation as published, without the guarantee (vulkan/factors.comp)
+  SceneEffects effects = {};  ///< what is not there costs no shader, buffer or dispatch
+  bool legend = true;         ///< drawn into picture() where an effect has a scale
 };
 
 /// What a frame did and reached. Milliseconds.
 struct FrameStats {
   double select_ms = 0, extract_ms = 0, send_ms = 0, blend_ms = 0, finish_ms = 0;  ///< on the host
-  double factors_ms = 0, draw_ms = 0;                                              ///< on the card
+  double light_ms = 0, factors_ms = 0, draw_ms = 0;                                ///< on the card
   double total_ms = 0;
   std::size_t tiles_drawn = 0, tiles_made = 0, tiles_wanted = 0;  ///< wanted: still missing
   std::size_t tiles_coarse = 0;  ///< drawn above the asked error, because finer ones are not there yet
@@ -46,8 +48,9 @@ struct FrameStats {
   std::size_t dispatches = 0, draws = 0;  ///< the blend's own not counted; draws of the indirect calls
   std::uint64_t triangles = 0;            ///< 0 where the device does not count
   double pixels_asked = 0, pixels_reached = 0;
-  double bound_max = 0;  ///< metres: of all heights drawn
-  BlendCounts blended;   ///< of the tiles made
+  double bound_max = 0;                                   ///< metres: of all heights drawn
+  BlendCounts blended;                                    ///< of the tiles made
+  std::size_t shadow_dispatches = 0, sky_dispatches = 0;  ///< of the light map
 };
 
 /// One picture at a time. Not safe for concurrent use.
@@ -63,6 +66,9 @@ class Renderer {
   /// is that of the one before is not drawn again: FrameStats::draws is 0. Throws Error: the device's memory,
   /// damaged payloads.
   FrameStats draw(const Camera& camera);
+  /// Other effects from the next picture on, of the same kinds of overlay; what stays valid is kept. Throws
+  /// Error: an overlay of bounds or sources that the renderer was not made with.
+  void change(const SceneEffects& effects);
   /// What was drawn last, read from the card when asked for.
   Image picture() const;
   /// Metres along the ray through each pixel's centre, row-major; NaN where there is sky.

@@ -41,7 +41,7 @@ static void describe(Fields<SceneEffects>& f) {
   f.object("contours", &E::contours, fields<effects::Contours>(), "lines of equal height");
   f.object("error", &E::error, fields<effects::ErrorOverlay>(), "overlay: the bound of each height");
   f.object("source", &E::source, fields<effects::SourceOverlay>(), "overlay: which grid answers");
-  f.object("cost", &E::cost, fields<effects::CostOverlay>(), "overlay: patches read at a place");
+  f.object("cost", &E::cost, fields<effects::CostOverlay>(), "overlay: patches that a tile was made of");
   f.object("wireframe", &E::wireframe, fields<effects::Wireframe>(), "edges of the triangles drawn");
 }
 

@@ -16,9 +16,10 @@ struct TileFacts {
   /// Largest vertical distance of its own mesh from the best surface there is, or from the terrain where that
   /// surface has a better bound: what refining it can take away.
   double error = 0;
-  double reducible = 0;  ///< the share of `error` that comes of its patches, not of its mesh
-  double bound = 0;      ///< the largest guaranteed error of its heights
-  bool holes = false;    ///< some vertex has no data
+  double reducible = 0;     ///< the share of `error` that comes of its patches, not of its mesh
+  double bound = 0;         ///< the largest guaranteed error of its heights
+  bool holes = false;       ///< some vertex has no data
+  std::size_t patches = 0;  ///< that it was made of
 };
 
 /// How a slot is found for a new tile when none is free.

@@ -31,7 +31,8 @@ struct TileDraw {
   std::array<std::uint32_t, 4> beside_near, beside_far;
   float reducible = 0;  ///< metres (TileFacts)
   std::uint32_t holes = 0;
-  std::uint32_t unused[2] = {};
+  float patches = 0;  ///< that the tile was made of
+  std::uint32_t unused = 0;
   bool operator==(const TileDraw&) const = default;
 
   static constexpr std::uint32_t kAlone = 0xffffffffu;

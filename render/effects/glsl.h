@@ -19,9 +19,9 @@ namespace patchwork::glsl {
 using vec2 = glm::dvec2;
 using vec3 = glm::dvec3;
 using vec4 = glm::dvec4;
-using glm::abs, glm::acos, glm::atan, glm::clamp, glm::cos, glm::dot, glm::exp, glm::floor, glm::length,
-    glm::log, glm::max, glm::min, glm::mix, glm::normalize, glm::pow, glm::sin, glm::smoothstep, glm::sqrt,
-    glm::step;
+using glm::abs, glm::acos, glm::atan, glm::clamp, glm::cos, glm::dot, glm::exp, glm::floor, glm::fract,
+    glm::length, glm::log, glm::max, glm::min, glm::mix, glm::normalize, glm::pow, glm::sin, glm::smoothstep,
+    glm::sqrt, glm::step;
 
 #define float double
 #include "render/effects/look.glsl"

@@ -54,6 +54,13 @@ void put_water(Look& l, const Water& w, const Camera& camera) {
   l.water_surface.w = std::fmod(camera.eye.y, period);
 }
 
+void put_view(Look& l, const Camera& c) {
+  const CameraAxes a = axes(c);
+  l.view_right = {a.right, 1 / c.gamma()};
+  l.view_up = {a.up, 0.5 * c.width};
+  l.view_forward = {a.forward, 0.5 * c.height};
+}
+
 double opacity_of(const SceneEffects& e) {
   return e.error ? e.error->opacity : e.cost ? e.cost->opacity : e.source ? e.source->opacity : 0;
 }
@@ -77,7 +84,7 @@ Look look_of(const Scene& s, const LookInput& in) {
   }
   l.overlay = {in.scale.lowest, in.scale.highest, in.scale.logarithmic, opacity_of(e)};
   if (e.wireframe) l.wireframe = of(e.wireframe->color, e.wireframe->opacity);
-  l.wireframe_line = {e.wireframe ? e.wireframe->width : 0, 1 / in.view.camera.gamma(), 0, 0};
+  put_view(l, in.view.camera);
   return l;
 }
 

@@ -15,5 +15,8 @@ struct Look {
   vec4 contour_lines;  // x: interval, metres; y: every so many are bold (0: none); z: width, pixels
   vec4 overlay;        // x: lowest, y: highest, z: 1 for a logarithmic scale, w: opacity
   vec4 wireframe;      // colour; w: opacity
-  vec4 wireframe_line; // x: width, pixels; y: radians a pixel
+  vec4 light_map;      // xy: the eye's place in it, samples; z: samples a metre
+  vec4 view_right;     // the camera's axes; w: radians a pixel in the picture's middle
+  vec4 view_up;        // w: half of the picture's width, pixels
+  vec4 view_forward;   // w: half of its height
 };

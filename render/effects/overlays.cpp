@@ -22,7 +22,6 @@ void describe(Fields<CostOverlay>& f) {
 }
 
 void describe(Fields<Wireframe>& f) {
-  f.number("width", &Wireframe::width, between(0.1, 20), "pixels");
   f.color("color", &Wireframe::color, "of the lines");
   f.number("opacity", &Wireframe::opacity, between(0, 1), "of the lines");
 }

@@ -26,16 +26,15 @@ struct SourceOverlay {
 };
 void describe(Fields<SourceOverlay>& fields);
 
-/// How many patches the blend read at a place.
+/// How many patches each tile was made of.
 struct CostOverlay {
-  double highest = 6;  ///< patches at the end of the ramp
+  double highest = 20;  ///< patches at the end of the ramp
   double opacity = 0.8;
 };
 void describe(Fields<CostOverlay>& fields);
 
 /// The edges of the triangles that are drawn.
 struct Wireframe {
-  double width = 1;  ///< pixels
   Color color{0x10, 0x10, 0x10};
   double opacity = 0.5;
 };

@@ -29,7 +29,7 @@ vec3 base_color(Ground g) {
 
 vec3 light_on(Ground g) {
   float open = has_sky ? sky_light(g.open, look.ground.w) : 1.0;
-  if (!has_sun) return vec3(open);
+  if (!has_sun) return vec3(open * plain_light(g.normal));
   float reach = 1.0;
   if (has_shadow)
     reach = 1.0 - look.ambient.w * (1.0 - sun_reach(g.horizon, look.sun_direction.w, look.sun_light.w));
@@ -51,7 +51,7 @@ vec3 shade_sky(vec3 direction) {
   vec3 color = sky_color(direction);
   if (has_disc)
     color += vec3(look.sun_light) * 4.0 *
-             solar_disc(dot(direction, vec3(look.sun_direction)), look.tints.z, look.wireframe_line.y);
+             solar_disc(dot(direction, vec3(look.sun_direction)), look.tints.z, look.view_right.w);
   return color;
 }
 
@@ -66,7 +66,7 @@ vec3 water_over(Ground g, vec3 ground) {
   float away = way * (1.0 - share);
   if (look.water_surface.x > 0.0) {
     vec2 p = vec2(g.from_eye) * (1.0 - share) + vec2(look.water_surface.z, look.water_surface.w);
-    float footprint = away * look.wireframe_line.y / max(-to_ground.z, 0.02);
+    float footprint = away * look.view_right.w / max(-to_ground.z, 0.02);
     n = normalize(vec3(-wave_slope(p, look.water_surface.x, footprint), 1.0));
   }
   vec3 mirror = to_ground - 2.0 * dot(to_ground, n) * n;
@@ -84,6 +84,29 @@ vec3 shade_ground(Ground g) {
     color = through_air(color, vec3(look.air),
                         air_depth(look.air.w, length(g.from_eye), g.z - look.air_scale.y, look.air_scale.x));
   return color;
+}
+
+// Through the point (x, y) of the picture, in pixels.
+vec3 direction_through(float x, float y) {
+  float right = (x - look.view_up.w) * look.view_right.w, up = (look.view_forward.w - y) * look.view_right.w;
+  return normalize(vec3(look.view_forward) + vec3(look.view_right) * right + vec3(look.view_up) * up);
+}
+
+// By how much the height changes from pixel to pixel on ground with normal n, seen at from_eye: on its tangent
+// plane, so that no edge of a triangle shows.
+float height_change(vec3 from_eye, vec3 n) {
+  float axial = max(dot(from_eye, vec3(look.view_forward)), 1e-3);
+  vec3 d = from_eye / axial;
+  float facing = min(dot(n, d), -0.02 * length(d));
+  float x = look.view_right.z - d.z * dot(n, vec3(look.view_right)) / facing;
+  float y = look.view_up.z - d.z * dot(n, vec3(look.view_up)) / facing;
+  return axial * look.view_right.w * length(vec2(x, y));
+}
+
+// A fixed pattern of half a step of 8 bits either way: smooth colours do not fall into bands. Source: Jimenez,
+// "Next generation post processing in Call of Duty: Advanced Warfare" (2014), interleaved gradient noise.
+float dither(float x, float y) {
+  return (fract(52.9829189 * fract(0.06711056 * x + 0.00583715 * y)) - 0.5) / 255.0;
 }
 
 vec3 srgb(vec3 c) {

@@ -56,6 +56,8 @@ OwnedPipeline make_graphics(const Bindings& bindings, VkRenderPass pass, const G
   VkPipelineRasterizationStateCreateInfo raster{};
   raster.sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO, raster.lineWidth = 1;
   raster.polygonMode = state.lines ? VK_POLYGON_MODE_LINE : VK_POLYGON_MODE_FILL;
+  // Edges lie a little nearer than the triangles that they belong to.
+  raster.depthBiasEnable = state.lines, raster.depthBiasConstantFactor = 64;
   VkPipelineDepthStencilStateCreateInfo depth{};
   depth.sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO;
   depth.depthTestEnable = state.depth_test, depth.depthWriteEnable = state.depth_write;

@@ -26,6 +26,15 @@ constexpr std::uint32_t kTerrainTese[] = {
 constexpr std::uint32_t kTerrainFrag[] = {
 #include "terrain.frag.inc"
 };
+constexpr std::uint32_t kSkyVert[] = {
+#include "sky.vert.inc"
+};
+constexpr std::uint32_t kSkyFrag[] = {
+#include "sky.frag.inc"
+};
+constexpr std::uint32_t kLight[] = {
+#include "light.comp.inc"
+};
 
 }  // namespace
 
@@ -36,5 +45,8 @@ std::span<const std::uint32_t> terrain_vert() { return kTerrainVert; }
 std::span<const std::uint32_t> terrain_tesc() { return kTerrainTesc; }
 std::span<const std::uint32_t> terrain_tese() { return kTerrainTese; }
 std::span<const std::uint32_t> terrain_frag() { return kTerrainFrag; }
+std::span<const std::uint32_t> sky_vert() { return kSkyVert; }
+std::span<const std::uint32_t> sky_frag() { return kSkyFrag; }
+std::span<const std::uint32_t> light() { return kLight; }
 
 }  // namespace patchwork::shaders

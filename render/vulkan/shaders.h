@@ -13,5 +13,8 @@ std::span<const std::uint32_t> terrain_vert();
 std::span<const std::uint32_t> terrain_tesc();
 std::span<const std::uint32_t> terrain_tese();
 std::span<const std::uint32_t> terrain_frag();
+std::span<const std::uint32_t> sky_vert();
+std::span<const std::uint32_t> sky_frag();
+std::span<const std::uint32_t> light();
 
 }  // namespace patchwork::shaders

@@ -1,7 +1,8 @@
 #version 450
-// A pixel of the terrain.
+// A pixel of the terrain: what is known of the ground there, then shade.glsl.
 #extension GL_GOOGLE_include_directive : require
 #include "terrain.glsl"
+#include "effects.glsl"
 
 layout(location = 0) in vec3 place;
 layout(location = 1) in vec3 local;
@@ -11,15 +12,35 @@ layout(binding = 4) uniform sampler2DArray slopes;  // dh/dx, dh/dy at half cell
 
 layout(constant_id = 0) const bool kHoles = false;
 
-vec3 normal_here() {
-  const vec2 uv = (local.xy * 128.0 + 0.5) / 129.0;
-  const vec2 slope = texture(slopes, vec3(uv, float(tile.x))).xy;
-  return normalize(vec3(-slope, 1));
+// Linear between half cells.
+vec3 of_slot(vec2 at) { return vec3((at * 128.0 + 0.5) / 129.0, float(tile.x)); }
+
+Ground ground_here() {
+  Ground g;
+  g.from_eye = place;
+  g.z = place.z + look.air_scale.y + frame.detail.y * dot(place.xy, place.xy);
+  g.normal = normalize(vec3(-texture(slopes, of_slot(local.xy)).xy, 1));
+  g.change = has_contours ? height_change(place, g.normal) : 0.0;
+  const vec2 at = look.light_map.xy + place.xy * look.light_map.z;
+  g.horizon = has_shadow ? texture(sun_map, (at + 0.5) / vec2(textureSize(sun_map, 0))).x : 0.0;
+  g.open = has_sky ? texture(sky_map, (0.25 * at + 0.5) / vec2(textureSize(sky_map, 0))).x : 1.0;
+  g.value = has_cost ? facts_at(tile.y).z : has_scale ? texture(knowledge, of_slot(local.xy)).x : 0.0;
+  g.source = vec3(0);
+  if (has_source) g.source = class_color(int(texelFetch(knowledge, ivec3(local.xy * 128.0 + 0.5, tile.x), 0).y));
+  return g;
 }
+
+const bool is_plain = !(has_sun || has_sky || has_water || has_haze || has_tints || has_scale || has_source ||
+                        has_contours || is_wireframe);
 
 void main() {
   if (kHoles && local.z < 0.999) discard;
-  const vec3 n = normal_here();
-  const float light = 0.2 + 0.1 * dot(n, normalize(-place)) + 0.7 * max(dot(n, normalize(vec3(-0.5, 0.5, 0.7))), 0.0);
-  color = vec4(vec3(0.78, 0.76, 0.7) * light, 1);
+  if (is_plain) {  // as the benchmark's peers draw (tools/bench/peer_slopes.frag)
+    const vec3 n = normalize(vec3(-texture(slopes, of_slot(local.xy)).xy, 1));
+    color = vec4(vec3(0.78, 0.76, 0.7) * (0.25 + 0.75 * max(dot(n, normalize(vec3(-0.5, 0.5, 0.7))), 0.0)), 1);
+    return;
+  }
+  vec3 light = shade_ground(ground_here());
+  if (is_wireframe) light = mix(light, look.wireframe.rgb, look.wireframe.w);
+  color = picture_color(light);
 }

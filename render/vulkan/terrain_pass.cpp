@@ -13,23 +13,42 @@ constexpr VkDescriptorType kTexels = VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER;
 // terrain.glsl, factors.comp
 constexpr VkDescriptorType kFactorTypes[] = {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels,
                                              VK_DESCRIPTOR_TYPE_STORAGE_BUFFER};
-// terrain.glsl, terrain.tesc, terrain.frag
-constexpr VkDescriptorType kTypes[] = {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels,
-                                       VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER};
+// terrain.glsl, terrain.tesc, terrain.frag; effects.glsl
+constexpr auto kTypes = [] {
+  std::array<VkDescriptorType, FrameEffects::kFirst + FrameEffects::kTypes.size()> t{
+      VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, kTexels, kTexels, kTexels,
+      VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER};
+  for (std::size_t k = 0; k < FrameEffects::kTypes.size(); ++k)
+    t[FrameEffects::kFirst + k] = FrameEffects::kTypes[k];
+  return t;
+}();
 constexpr VkBufferUsageFlags kWordTexels =
     VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT;
 constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_TESSELLATION_CONTROL_BIT |
                                        VK_SHADER_STAGE_TESSELLATION_EVALUATION_BIT |
                                        VK_SHADER_STAGE_FRAGMENT_BIT;
 
-OwnedPipeline terrain_pipeline(const Bindings& bindings, VkRenderPass pass, bool holes) {
-  const std::uint32_t constants[] = {holes};
+OwnedPipeline terrain_pipeline(const Bindings& bindings, VkRenderPass pass, const FrameEffects& effects,
+                               bool holes, bool edges) {
+  const std::vector<std::uint32_t> constants = effects.constants(holes, edges);
   return make_graphics(bindings, pass,
                        {.stages = {{VK_SHADER_STAGE_VERTEX_BIT, shaders::terrain_vert()},
                                    {VK_SHADER_STAGE_TESSELLATION_CONTROL_BIT, shaders::terrain_tesc()},
                                    {VK_SHADER_STAGE_TESSELLATION_EVALUATION_BIT, shaders::terrain_tese()},
                                    {VK_SHADER_STAGE_FRAGMENT_BIT, shaders::terrain_frag()}},
-                        .constants = constants});
+                        .constants = constants,
+                        .lines = edges});
+}
+
+OwnedPipeline sky_pipeline(const Bindings& bindings, VkRenderPass pass, const FrameEffects& effects) {
+  const std::vector<std::uint32_t> constants = effects.constants(false, false);
+  return make_graphics(bindings, pass,
+                       {.stages = {{VK_SHADER_STAGE_VERTEX_BIT, shaders::sky_vert()},
+                                   {VK_SHADER_STAGE_FRAGMENT_BIT, shaders::sky_frag()}},
+                        .constants = constants,
+                        .topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST,
+                        .depth_write = false,
+                        .compare = VK_COMPARE_OP_EQUAL});
 }
 
 }  // namespace
@@ -37,11 +56,12 @@ OwnedPipeline terrain_pipeline(const Bindings& bindings, VkRenderPass pass, bool
 TerrainPass::TerrainPass(const Device::Impl& device, const TileStore& store, VkRenderPass pass,
                          std::uint32_t most_tiles)
     : device_(device),
+      store_(store),
+      pass_(pass),
       factor_bindings_(device, kFactorTypes, 0),
       bindings_(device, kTypes, 0, kStages),
       factors_pipeline_(make_pipeline(factor_bindings_, shaders::factors(), {})),
       edges_pipeline_(make_pipeline(factor_bindings_, shaders::edges(), {})),
-      pipelines_{terrain_pipeline(bindings_, pass, false), terrain_pipeline(bindings_, pass, true)},
       factor_sets_(factor_bindings_.make_set(factor_set_)),
       edge_sets_(factor_bindings_.make_set(edge_set_)),
       sets_(bindings_.make_set(set_)),
@@ -100,6 +120,25 @@ void TerrainPass::record_factors(VkCommandBuffer commands) const {
   run(edges_pipeline_, edge_set_);
 }
 
+TerrainPass::Pipelines TerrainPass::make_pipelines(const FrameEffects& effects) const {
+  Pipelines p;
+  const bool edges = has(effects.on(), effects::Id::wireframe);
+  for (const bool holes : {false, true}) {
+    p.ground[holes] = terrain_pipeline(bindings_, pass_, effects, holes, false);
+    if (edges) p.edges[holes] = terrain_pipeline(bindings_, pass_, effects, holes, true);
+  }
+  if (effects.draws_sky()) p.sky = sky_pipeline(bindings_, pass_, effects);
+  return p;
+}
+
+void TerrainPass::use(const FrameEffects& effects) {
+  if (generation_ != effects.generation()) effects.bind(bindings_, set_, store_);
+  generation_ = effects.generation();
+  const auto [at, fresh] = pipelines_.try_emplace(effects.on().to_ulong());
+  if (fresh) at->second = make_pipelines(effects);
+  used_ = &at->second;
+}
+
 void TerrainPass::record_draws(VkCommandBuffer commands) const {
   vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, bindings_.layout(), 0, 1, &set_, 0,
                           nullptr);
@@ -109,8 +148,12 @@ void TerrainPass::record_draws(VkCommandBuffer commands) const {
     vkCmdDrawIndirect(commands, calls_.get(), first * sizeof(VkDrawIndirectCommand), n,
                       sizeof(VkDrawIndirectCommand));
   };
-  draw(pipelines_[0], 0, solid_);
-  draw(pipelines_[1], solid_, holed_);
+  draw(used_->ground[0], 0, solid_);
+  draw(used_->ground[1], solid_, holed_);
+  if (used_->edges[0]) draw(used_->edges[0], 0, solid_), draw(used_->edges[1], solid_, holed_);
+  if (!used_->sky) return;
+  vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, used_->sky.get());
+  vkCmdDraw(commands, 3, 1, 0, 0);
 }
 
 }  // namespace patchwork::vk

@@ -1,12 +1,15 @@
-// Draws tiles: two dispatches say how finely each block is tessellated, one indirect call draws all of them.
+// Draws tiles: two dispatches say how finely each block is tessellated, one indirect call draws all of them,
+// and what is left of the picture is sky.
 #pragma once
 
 #include <array>
+#include <map>
 #include <memory>
 #include <span>
 
 #include "blend/vulkan/pipeline_impl.h"
 #include "render/tile_seams.h"
+#include "render/vulkan/frame_effects_impl.h"
 #include "render/vulkan/target_impl.h"
 #include "render/vulkan/tile_store_impl.h"
 
@@ -28,18 +31,31 @@ class TerrainPass {
   void set(const FrameBlock& frame, std::span<const TileDraw> draws);
   /// Outside of a render pass: factors for what was set.
   void record_factors(VkCommandBuffer commands) const;
-  /// Inside of one.
+  /// How pixels are coloured from now on: pipelines are made when a set of effects is first met. REQUIRES: as
+  /// for set.
+  void use(const FrameEffects& effects);
+  /// Inside of one, after use.
   void record_draws(VkCommandBuffer commands) const;
 
   std::size_t bytes_set() const { return bytes_set_; }  ///< by the last call
   std::uint32_t draws() const { return solid_ + holed_; }
 
  private:
+  // Of one set of effects; what it does not need is none.
+  struct Pipelines {
+    std::array<OwnedPipeline, 2> ground, edges;  // without and with holes
+    OwnedPipeline sky;
+  };
+  Pipelines make_pipelines(const FrameEffects& effects) const;
   void bind_all(const TileStore& store);
   const Device::Impl& device_;
+  const TileStore& store_;
+  VkRenderPass pass_;
   Bindings factor_bindings_, bindings_;  // of the dispatches; of the draws
   OwnedPipeline factors_pipeline_, edges_pipeline_;
-  std::array<OwnedPipeline, 2> pipelines_;  // without and with holes
+  std::map<unsigned long, Pipelines> pipelines_;  // by the set of effects
+  const Pipelines* used_ = nullptr;
+  unsigned generation_ = 0;
   VkDescriptorSet factor_set_ = VK_NULL_HANDLE, edge_set_ = VK_NULL_HANDLE, set_ = VK_NULL_HANDLE;
   OwnedSets factor_sets_, edge_sets_, sets_;
   Buffer frame_, draws_, factors_, edges_, calls_;

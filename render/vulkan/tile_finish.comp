@@ -11,10 +11,14 @@ layout(binding = 2) writeonly buffer Blocks { vec4 blocks[]; };
 layout(binding = 3, rg16f) writeonly uniform image2DArray slopes;
 layout(binding = 4) writeonly buffer Summaries { float summaries[]; };  // kSummary a tile
 layout(binding = 5) readonly buffer Slots { uint slots[]; };
+layout(binding = 6, rg16f) writeonly uniform image2DArray knowledge;    // only with kKnowing: bound, source
+layout(binding = 7) uniform isamplerBuffer words;                       // the results as whole numbers
+layout(constant_id = 0) const bool kKnowing = false;
 layout(push_constant) uniform Push {
   uint bound_at, slope_at;  // where planes begin
   float shift;              // metres: from the evaluator's base to the slots'
   float between;            // of the largest second differences: what the surface may do between samples
+  uint source_at;
 } push;
 
 const int kVertices = 65, kSide = 131, kBlockSamples = 16, kSummary = 8;
@@ -119,6 +123,13 @@ void main() {
     const int texel = slope_base + 2 * ((at.y + 1) * kSide + at.x + 1);
     const vec2 s = vec2(texelFetch(results, texel).x, texelFetch(results, texel + 1).x);
     imageStore(slopes, ivec3(at, slot), vec4(isnan(s.x + s.y) ? vec2(0) : s, 0, 0));
+  }
+  for (int k = lane; kKnowing && k < 129 * 129; k += 64) {
+    const ivec2 at = ivec2(k % 129, k / 129);
+    const int texel = base + (at.y + 1) * kSide + at.x + 1;
+    const float bound = texelFetch(results, int(push.bound_at) + texel).x;
+    const int source = texelFetch(words, int(push.source_at) + texel).x;
+    imageStore(knowledge, ivec3(at, slot), vec4(isnan(bound) ? 0 : bound, source, 0, 0));
   }
   barrier();
   if (lane < 6) {

@@ -21,12 +21,13 @@ constexpr std::uint32_t kSummary = 8;             // floats of a tile: tile_fini
 constexpr VkDescriptorType kTypes[] = {
     VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
     VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
-    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_BUFFER};
-constexpr vk::Planes kPlanes{.bound = true, .source = false, .gradient = true};
+    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
+    VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,        VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER};
 
 struct FinishPush {
   std::uint32_t bound_at, slope_at;
   float shift, between;
+  std::uint32_t source_at;
 };
 
 double ms_since(std::chrono::steady_clock::time_point start) {
@@ -46,7 +47,7 @@ Tile sampled_tile(const TileLattice& lattice, const TileKey& key) {
 
 // What a tile's patches say of it: do they come of one grid, and what do samples miss between them.
 struct PatchFacts {
-  bool any = false;
+  std::size_t patches = 0;
   double accuracy = 0;   // metres: of the grid, where there is only one
   double unsampled = 0;  // metres
 };
@@ -76,7 +77,7 @@ PatchFacts facts_of(const Database& db, const std::vector<Blend::Placed>& placed
     if (!p.bounds.meets(place)) continue;
     const Grid& grid = db.grid(p.id.grid());
     several |= only && only != &grid;
-    only = &grid, f.any = true;
+    only = &grid, ++f.patches;
     f.unsampled = std::max(f.unsampled, missed(grid, p.id, spacing));
   }
   if (only && !several) f.accuracy = only->info.accuracy + only->info.quantisation;
@@ -112,7 +113,7 @@ struct TileMaker::Impl {
         smoothness(k),
         memory(m),
         bindings(device->impl(), kTypes, sizeof(FinishPush)),
-        finish(vk::make_pipeline(bindings, shaders::tile_finish(), {})),
+        finish(make_finish()),
         sets(bindings.make_set(set)),
         summaries(device->impl(), kMost * kSummary * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
                   vk::Where::readback),
@@ -120,7 +121,17 @@ struct TileMaker::Impl {
         commands(device->impl()) {
     bindings.bind(set, 1, store.heights), bindings.bind(set, 2, store.blocks);
     bindings.bind(set, 3, VK_NULL_HANDLE, store.slopes.view(), VK_IMAGE_LAYOUT_GENERAL);
+    const vk::Texture& knowledge = store.knowledge ? *store.knowledge : store.slopes;
+    bindings.bind(set, 6, VK_NULL_HANDLE, knowledge.view(), VK_IMAGE_LAYOUT_GENERAL);
     bindings.bind(set, 4, summaries), bindings.bind(set, 5, slots);
+  }
+
+  vk::OwnedPipeline make_finish() const {
+    const std::uint32_t knowing[] = {store.knowledge.has_value()};
+    return vk::make_pipeline(bindings, shaders::tile_finish(), knowing);
+  }
+  vk::Planes planes() const {
+    return {.bound = true, .source = store.knowledge.has_value(), .gradient = true};
   }
 
   void use(const std::vector<PatchId>& patches) {
@@ -138,10 +149,12 @@ struct TileMaker::Impl {
   // The submission's results go to the slots of its tiles, and each tile's summary to the host.
   void run_finish(const vk::Frame& frame, std::span<const std::uint32_t> to) {
     const vk::OwnedView results = vk::texels(device->impl(), frame.results_on_card(), VK_FORMAT_R32_SFLOAT);
-    bindings.bind(set, 0, results);
+    const vk::OwnedView words = vk::texels(device->impl(), frame.results_on_card(), VK_FORMAT_R32_SINT);
+    bindings.bind(set, 0, results), bindings.bind(set, 7, words);
     std::copy(to.begin(), to.end(), reinterpret_cast<std::uint32_t*>(slots.mapped()));
-    const auto plane = std::uint32_t(to.size() * kSide * kSide);  // heights, bounds, slopes
-    const FinishPush p{plane, 2 * plane, float(blend->impl().base - base), smoothness == 0 ? 0.5f : 0.25f};
+    const auto plane = std::uint32_t(to.size() * kSide * kSide);  // heights, bounds, perhaps sources, slopes
+    const FinishPush p{plane, (2 + planes().source) * plane, float(blend->impl().base - base),
+                       smoothness == 0 ? 0.5f : 0.25f, 2 * plane};
     const VkCommandBuffer c = commands.begin();
     vk::barrier(c);
     vkCmdBindPipeline(c, VK_PIPELINE_BIND_POINT_COMPUTE, finish.get());
@@ -157,7 +170,7 @@ struct TileMaker::Impl {
     TileFacts f;
     const double shift = blend->impl().base;
     f.lowest = double(s[0]) + shift, f.highest = double(s[1]) + shift;
-    f.bound = double(s[3]), f.holes = s[4] > 0;
+    f.bound = double(s[3]), f.holes = s[4] > 0, f.patches = patches.patches;
     f.reducible = patches.unsampled + (improvable ? std::max(0.0, f.bound - patches.accuracy) : 0);
     f.error = double(s[2]) + f.reducible;
     // A hole's outline is drawn to a cell.
@@ -183,7 +196,7 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
   const BlendCounts now = b.run(
       frame, sampled, kSide,
       [&](const TileBins& bins) {
-        vk::Work work = b.tile_work(frame, bins, kSide, kPlanes);
+        vk::Work work = b.tile_work(frame, bins, kSide, planes());
         work.read_from = work.result_words;
         return work;
       },
@@ -226,7 +239,7 @@ std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tile
   for (std::size_t k = 0; k < tiles.size(); ++k) {
     assert(tiles[k].level == level);
     const PatchFacts f = facts_of(db, blend->impl().placed, places[k], 0.5 * lattice.step(level));
-    if (!f.any) {
+    if (f.patches == 0) {
       made.push_back({tiles[k], {}, TileCache::kNoSlot});
       continue;
     }

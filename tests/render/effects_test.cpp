@@ -329,6 +329,35 @@ TEST(Contours, LinesHaveTheirWidthInPixels) {
   EXPECT_EQ(r.contour_lines(100, 100, 100, 5, 1), 0) << "a line a pixel is none";
 }
 
+// The height's change a pixel, against moving the ray by a hundredth of one.
+TEST(Contours, ChangeIsThatOfTheTangentPlane) {
+  const SceneView view = a_view();
+  ShadeReference r = reference_of(Scene{}, {view}, {});
+  const dvec3 n = glm::normalize(dvec3(0.2, -0.4, 1));
+  const auto height = [&](double x, double y) {
+    const Ray ray = ray_through(view.camera, x, y);
+    return ray.direction.z * -700 / glm::dot(n, ray.direction);  // of a plane 700 m away
+  };
+  for (const auto& [x, y] : {std::pair{20.0, 170.0}, {160.0, 120.0}, {300.0, 179.0}}) {
+    const double dx = (height(x + 0.01, y) - height(x - 0.01, y)) / 0.02;
+    const double dy = (height(x, y + 0.01) - height(x, y - 0.01)) / 0.02;
+    const Ray ray = ray_through(view.camera, x, y);
+    const dvec3 place = ray.direction * (-700 / glm::dot(n, ray.direction));
+    EXPECT_NEAR(r.height_change(place, n), std::hypot(dx, dy), 1e-3 * std::hypot(dx, dy));
+  }
+}
+
+TEST(Dither, IsHalfAStepEitherWayAndNothingOnAverage) {
+  ShadeReference r;
+  double sum = 0;
+  for (int k = 0; k < 10000; ++k) {
+    const double d = r.dither(k % 100 + 0.5, k / 100 + 0.5);
+    EXPECT_LE(std::abs(d), 0.5 / 255);
+    sum += d;
+  }
+  EXPECT_NEAR(sum / 10000, 0, 0.02 / 255);
+}
+
 TEST(Shadow, FadesOverItsSoftness) {
   ShadeReference r;
   const double half = 0.5 * kDegree, tan30 = std::tan(30 * kDegree);
@@ -365,13 +394,21 @@ TEST(SolarDisc, IsSeenWhereTheSunStands) {
       << "the glow has an end";
 }
 
+TEST(Look, DirectionsAreTheCamerasRays) {
+  const SceneView view = a_view();
+  ShadeReference r = reference_of(Scene{}, {view}, {});
+  for (const auto& [i, j] : {std::pair{0, 0}, {319, 179}, {160, 90}, {17, 101}})
+    EXPECT_NEAR(glm::distance(r.direction_through(i + 0.5, j + 0.5), ray(view.camera, i, j).direction), 0,
+                1e-12);
+}
+
 TEST(Look, BlockHoldsItsNumbersInOrder) {
   Scene s = all_effects();
   const effects::Look look = effects::look_of(s, {a_view()});
   const auto block = effects::block_of(look);
   EXPECT_EQ(block[0], float(look.sun_direction.x));
   EXPECT_EQ(block[7], float(look.sun_light.w));
-  EXPECT_EQ(block[block.size() - 3], float(look.wireframe_line.y));
+  EXPECT_EQ(block[block.size() - 1], float(look.view_forward.w));
   EXPECT_EQ(block.size() % 4, 0u);
 }
 

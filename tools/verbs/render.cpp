@@ -72,6 +72,7 @@ Json facts(const FrameStats& s) {
             {"send", s.send_ms},
             {"blend", s.blend_ms},
             {"finish", s.finish_ms},
+            {"light", s.light_ms},
             {"factors", s.factors_ms},
             {"draw", s.draw_ms},
             {"total", s.total_ms}}},
@@ -138,7 +139,9 @@ void run(const Options& o, const Common& common) {
                      .smoothness = scene.smoothness,
                      .memory = std::min<std::size_t>(common.memory / 2, std::size_t{1} << 30),
                      .background = scene.background,
-                     .published = o.published});
+                     .published = o.published,
+                     .effects = scene.effects,
+                     .legend = scene.legend});
   Total total;
   Json frames = Json::array();
   ProgressBar bar(common, "render", double(views.size()), "frames");

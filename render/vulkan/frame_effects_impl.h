@@ -1,0 +1,70 @@
+// The effects of a frame on the card: which are on, their numbers, ramps and maps.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "render/effects/look.h"
+#include "render/vulkan/light_map_impl.h"
+#include "render/vulkan/tile_store_impl.h"
+
+namespace patchwork::vk {
+
+class FrameEffects {
+ public:
+  /// `scene`: effects, background, smoothness. REQUIRES: `db` outlives it.
+  FrameEffects(const Device::Impl& device, const Database& db, const Scene& scene);
+
+  /// What the pictures from now on call for.
+  void change(const Scene& scene);
+  const Scene& scene() const { return scene_; }
+  /// Heights changed: what rests on them is made anew.
+  void heights_changed() { map_.drop_heights(), put_ramps(), changed_ = true; }
+
+  /// Of the next picture: `bounds` of its tiles, metres. Throws Error: what LightMap throws.
+  /// Returns false if all is as it was for the picture before.
+  bool prepare(effects::SceneView view, std::span<const float> bounds);
+  const effects::Set& on() const { return on_; }
+  /// Metres that the ground sinks a square metre of distance.
+  double curvature(const effects::SceneView& view) const;
+  /// What the picture's colours stand for, where the scene wants it.
+  void draw_legend(Image& picture) const;
+  std::size_t bytes_set() const { return bytes_set_; }  ///< by the last prepare
+  std::size_t shadow_dispatches() const { return map_.shadow_dispatches; }
+  std::size_t sky_dispatches() const { return map_.sky_dispatches; }
+
+  /// Outside of a render pass, before anything is bound: makes stale maps.
+  void record_maps(VkCommandBuffer commands);
+
+  /// What effects.glsl binds, from binding kFirst on; changes with the generation.
+  static constexpr std::uint32_t kFirst = 5;
+  static constexpr std::array<VkDescriptorType, 5> kTypes = {
+      VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+      VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+      VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER};
+  void bind(const Bindings& bindings, VkDescriptorSet set, const TileStore& store) const;
+  unsigned generation() const { return map_.generation(); }
+  /// Specialization constants of effects.glsl behind `holes`.
+  std::vector<std::uint32_t> constants(bool holes, bool wireframe) const;
+  /// The sky is more than the background.
+  bool draws_sky() const { return has(on_, effects::Id::haze) || has(on_, effects::Id::solar_disc); }
+
+ private:
+  void put_ramps();
+  bool wants_map() const { return scene_.effects.shadow || scene_.effects.sky; }
+  ValueScale overlay_of(std::span<const float> bounds) const;
+
+  const Database& db_;
+  Scene scene_;
+  LightMap map_;
+  effects::Set on_;
+  ValueScale tints_, scale_;
+  std::array<float, effects::kLookFloats> block_{};
+  Buffer look_, ramps_;
+  OwnedView ramp_texels_;
+  std::size_t bytes_set_ = 0;
+  bool changed_ = true;
+};
+
+}  // namespace patchwork::vk

@@ -108,6 +108,10 @@ struct Renderer::Impl {
       for (int k = 0; k < 3; ++k) b.sides[s][k] = float(frustum.sides()[std::size_t(s)][std::size_t(k)]);
     for (int k = 0; k < 3; ++k) b.axis[k] = float(frustum.axis()[std::size_t(k)]);
     b.axis[3] = float(kNear);
+    const CameraAxes a = axes(camera);
+    const double high = camera.tan_half(), wide = high * camera.width / camera.height;
+    for (int k = 0; k < 3; ++k) b.right[k] = float(wide * a.right[k]), b.up[k] = float(high * a.up[k]);
+    b.right[3] = float(2.0 / camera.width), b.up[3] = float(2.0 / camera.height);
     const auto cell = half_cell_at(lattice, {camera.eye.x, camera.eye.y});
     b.eye[0] = float(camera.eye.x - (lattice.origin().x + cell[0] * lattice.half_cell()));
     b.eye[1] = float(camera.eye.y - (lattice.origin().y + cell[1] * lattice.half_cell()));

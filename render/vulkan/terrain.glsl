@@ -5,6 +5,7 @@ layout(binding = 0) uniform FrameBlock {
   mat4 clip;       // of positions relative to the eye
   vec4 sides[4];   // inward normals of the picture's sides; all planes go through the eye
   vec4 axis;       // of the view; w: where the near plane is
+  vec4 right, up;  // of the view, to the picture's edges at depth 1; w: 2 / width, 2 / height, pixels
   vec4 eye;        // xy: what the eye's place is past its half cell; z: base of the heights - the eye's; w: half cell
   vec4 detail;     // x: gamma / pixel error: metres of depth for a metre of error; y: curvature, 1/metre;
                    // z: gamma; w: 1 for the published choices (factors.comp)
@@ -15,6 +16,7 @@ layout(binding = 2) uniform samplerBuffer heights; // metres over the base; kVer
 const int kCells = 64, kVertices = 65, kBlockCells = 8, kBlocks = 8, kDraw = 10;
 const uint kAlone = 0xffffffffu, kLarger = 0x80000000u, kSecondHalf = 0x40000000u, kFiner = 0x20000000u;
 const uint kNumber = 0x1fffffffu;
+const float kNoData = -1e7;  // instead of a draw's number: negative all over a triangle with such a vertex
 
 struct Draw { ivec2 first; int stride, slot; };
 Draw draw_at(int d) {
@@ -46,4 +48,10 @@ int texel_of(int d, int slot, ivec2 at) {
 vec3 position_of(Draw draw, ivec2 at, float height) {
   const vec2 p = vec2(draw.first + at * draw.stride) * frame.eye.w - frame.eye.xy;
   return vec3(p, height + frame.eye.z - frame.detail.y * dot(p, p));
+}
+
+// In a fragment shader: metres from the eye. Cheaper than a varying: lavapipe sets each up for each triangle.
+vec3 place_at(vec4 pixel) {
+  const float x = pixel.x * frame.right.w - 1, y = 1 - pixel.y * frame.up.w;
+  return (frame.axis.xyz + x * frame.right.xyz + y * frame.up.xyz) / pixel.w;
 }

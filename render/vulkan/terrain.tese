@@ -5,9 +5,7 @@
 
 layout(quads, equal_spacing, ccw) in;
 layout(location = 0) patch in ivec2 whose;
-layout(location = 0) out vec3 place;           // metres from the eye
-layout(location = 1) out vec3 local;           // xy: in the tile, 0 to 1; z: 1, less beside a vertex without data
-layout(location = 2) flat out ivec2 tile;      // slot, draw
+layout(location = 0) out vec4 local;  // xy: in the tile, 0 to 1; z: the draw, kNoData without data; w: the slot
 
 void main() {
   const int d = whose.x;
@@ -16,8 +14,6 @@ void main() {
   const ivec2 at = block * (2 * kBlockCells) + ivec2(gl_TessCoord.xy * float(2 * kBlockCells) + 0.5);
   const float height = texelFetch(heights, texel_of(d, draw.slot, at)).x;
   const bool valid = !isnan(height);
-  place = position_of(draw, at, valid ? height : 0);
-  local = vec3(vec2(at) / float(2 * kCells), valid ? 1.0 : 0.0);
-  tile = ivec2(draw.slot, d);
-  gl_Position = frame.clip * vec4(place, 1);
+  local = vec4(vec2(at) / float(2 * kCells), valid ? float(d) : kNoData, float(draw.slot));
+  gl_Position = frame.clip * vec4(position_of(draw, at, valid ? height : 0), 1);
 }

@@ -17,10 +17,10 @@ namespace patchwork::vk {
 
 /// terrain.glsl: FrameBlock.
 struct FrameBlock {
-  float clip[16], sides[4][4], axis[4], eye[4], detail[4];
+  float clip[16], sides[4][4], axis[4], right[4], up[4], eye[4], detail[4];
   bool operator==(const FrameBlock&) const = default;
 };
-static_assert(sizeof(FrameBlock) == 176);
+static_assert(sizeof(FrameBlock) == 208);
 
 class TerrainPass {
  public:

@@ -24,7 +24,8 @@ double stretch(double x, double y, double up, double ahead) { return std::hypot(
 
 }  // namespace
 
-Frustum::Frustum(const Camera& camera, double curvature) : eye_(camera.eye), curvature_(curvature) {
+Frustum::Frustum(const Camera& camera, double curvature, double far)
+    : eye_(camera.eye), curvature_(curvature), far_(far) {
   const CameraAxes a = axes(camera);
   const double ty = camera.tan_half(), tx = ty * camera.width / camera.height;
   axis_ = numbers(a.forward);
@@ -56,7 +57,7 @@ bool Frustum::sees(const Box3& box) const {
   const Box3 b = bent(box);
   for (const auto& n : sides_)
     if (largest_along(n, b) < 0) return false;
-  return largest_along(axis_, b) > 0;
+  return largest_along(axis_, b) > 0 && -largest_along(opposite(axis_), b) <= far_;
 }
 
 double Frustum::pixels_per_metre(const Box3& box) const {

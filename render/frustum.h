@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 
 #include "db/frame.h"
 #include "render/camera.h"
@@ -17,7 +18,9 @@ struct Box3 {
 class Frustum {
  public:
   /// `curvature`: metres by which the earth drops away, per square metre of distance in the plane.
-  explicit Frustum(const Camera& camera, double curvature = 0);
+  /// `far`: metres along the view's axis; boxes beyond are not seen.
+  explicit Frustum(const Camera& camera, double curvature = 0,
+                   double far = std::numeric_limits<double>::infinity());
   /// False only if no point of the box is on the screen.
   bool sees(const Box3& box) const;
   /// Pixels a metre of vertical displacement takes anywhere in the box, never too few; infinity where the
@@ -33,7 +36,7 @@ class Frustum {
  private:
   Box3 bent(const Box3& box) const;
   Point3 eye_;
-  double curvature_, gamma_;
+  double curvature_, far_, gamma_;
   std::array<double, 3> axis_;
   std::array<std::array<double, 3>, 4> sides_;
 };

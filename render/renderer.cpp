@@ -176,7 +176,7 @@ FrameStats Renderer::Impl::draw(const Camera& from) {
   camera = from, camera.width = options.width, camera.height = options.height;
   const effects::SceneView view = scene_view();
   const double curvature = effects.curvature(view);
-  const Frustum frustum(camera, curvature);
+  const Frustum frustum(camera, curvature, options.far);
   const Selection& selection = supply.update(frustum, stats);
   make_draws(lattice, selection, supply.cache(), {camera.eye.x, camera.eye.y}, draws);
   const vk::FrameBlock now = make_block(frustum, curvature);

@@ -1,6 +1,7 @@
 // From a camera to a picture: selects tiles, makes those that are missing, draws.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -22,9 +23,12 @@ struct TileStore;
 }  // namespace vk
 
 struct RendererOptions {
-  int width = 1280, height = 720;               ///< pixels
-  double pixel_error = 1;                       ///< pixels
-  int smoothness = 1;                           ///< k
+  int width = 1280, height = 720;  ///< pixels
+  double pixel_error = 1;          ///< pixels
+  int smoothness = 1;              ///< k
+  Composition composition = Composition::priority;
+  double far =
+      std::numeric_limits<double>::infinity();  ///< metres along the line of sight; tiles beyond are left out
   std::size_t memory = std::size_t{512} << 20;  ///< bytes on the card: half for tiles, half for patches
   TilePolicy policy = TilePolicy::lru;
   Color background{0xbf, 0xd4, 0xe8};

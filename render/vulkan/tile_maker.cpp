@@ -92,7 +92,7 @@ struct TileMaker::Impl {
   const TileLattice& lattice;
   vk::TileStore& store;
   double base;
-  int smoothness;
+  BlendOptions options;
   std::size_t memory;
   std::unique_ptr<VulkanBlend> blend;
   vk::Bindings bindings;
@@ -104,13 +104,13 @@ struct TileMaker::Impl {
   TileMakerCounts counts;
 
   Impl(std::shared_ptr<Device> d, const Database& database, const TileLattice& l, vk::TileStore& s, double b,
-       int k, std::size_t m)
+       const BlendOptions& k, std::size_t m)
       : device(std::move(d)),
         db(database),
         lattice(l),
         store(s),
         base(b),
-        smoothness(k),
+        options(k),
         memory(m),
         bindings(device->impl(), kTypes, sizeof(FinishPush)),
         finish(make_finish()),
@@ -140,7 +140,7 @@ struct TileMaker::Impl {
     if (blend)
       blend->change(patches);
     else
-      blend = std::make_unique<VulkanBlend>(device, db, patches, BlendOptions{.smoothness = smoothness},
+      blend = std::make_unique<VulkanBlend>(device, db, patches, options,
                                             VulkanOptions{.memory = memory, .tile = kSide, .gradient = true});
     counts.bytes += blend->pool().traffic().bytes - before;
     counts.patches += blend->pool().traffic().sent - sent;
@@ -154,7 +154,7 @@ struct TileMaker::Impl {
     std::copy(to.begin(), to.end(), reinterpret_cast<std::uint32_t*>(slots.mapped()));
     const auto plane = std::uint32_t(to.size() * kSide * kSide);  // heights, bounds, perhaps sources, slopes
     const FinishPush p{plane, (2 + planes().source) * plane, float(blend->impl().base - base),
-                       smoothness == 0 ? 0.5f : 0.25f, 2 * plane};
+                       options.smoothness == 0 ? 0.5f : 0.25f, 2 * plane};
     const VkCommandBuffer c = commands.begin();
     vk::barrier(c);
     vkCmdBindPipeline(c, VK_PIPELINE_BIND_POINT_COMPUTE, finish.get());
@@ -257,8 +257,8 @@ std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tile
 }
 
 TileMaker::TileMaker(std::shared_ptr<Device> device, const Database& db, const TileLattice& lattice,
-                     vk::TileStore& store, double base, int smoothness, std::size_t memory)
-    : impl_(std::make_unique<Impl>(std::move(device), db, lattice, store, base, smoothness, memory)) {}
+                     vk::TileStore& store, double base, const BlendOptions& blend, std::size_t memory)
+    : impl_(std::make_unique<Impl>(std::move(device), db, lattice, store, base, blend, memory)) {}
 TileMaker::~TileMaker() = default;
 
 std::vector<TileMaker::Made> TileMaker::make(std::span<const TileKey> tiles, const TakeSlot& take_slot) {

@@ -205,6 +205,24 @@ TEST_F(TerrainTest, WithNothingChangedNothingIsSentOrDispatched) {
   EXPECT_EQ(third.tiles_made, 0u);
 }
 
+// The same land from a distance, surveyed more and more finely: the picture needs no more triangles.
+TEST_F(TerrainTest, AWholeMapCostsNoMoreWithSixteenTimesTheData) {
+  std::vector<double> triangles;
+  for (const int samples : {81, 161, 321}) {
+    const double step = 1600.0 / (samples - 1);
+    const Land land(
+        {survey({.width = samples, .height = samples, .geotransform = {0, step, 0, 1600, 0, -step}}, 0)});
+    Renderer r(test_device(), land.db(),
+               {.width = kWidth, .height = kHeight, .pixel_error = 2, .memory = std::size_t{128} << 20});
+    const FrameStats s = r.draw(overview(land.db().extent(), 200, 400, 45, kWidth, kHeight));
+    EXPECT_LE(s.pixels_reached, 2);
+    triangles.push_back(double(s.triangles));
+  }
+  std::printf("triangles: %g %g %g\n", triangles[0], triangles[1], triangles[2]);
+  EXPECT_LE(triangles[2], 1.5 * triangles[0]);
+  EXPECT_GT(triangles[2], 0.5 * triangles[0]);
+}
+
 // Depth pictures as bits: NaN equals itself.
 std::vector<std::uint32_t> bits(const std::vector<float>& v) {
   std::vector<std::uint32_t> b(v.size());

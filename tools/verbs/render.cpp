@@ -3,6 +3,7 @@
 #include <gdal_priv.h>
 
 #include <filesystem>
+#include <thread>
 
 #include "db/error.h"
 #include "render/camera_path.h"
@@ -18,7 +19,7 @@ namespace {
 struct Options {
   std::string database, out, scene, depth;
   std::vector<int> size;
-  double pixel_error = 0;
+  double pixel_error = 0, follow = 0;
   bool stats = false, published = false;
 };
 
@@ -123,48 +124,83 @@ Json summary(const Total& t, const Scene& scene, const std::string& device, doub
           {"engine", device}};
 }
 
+RendererOptions options_of(const Scene& scene, const Options& o, const Common& common) {
+  RendererOptions r{.width = scene.width, .height = scene.height};
+  r.pixel_error = scene.pixel_error, r.smoothness = scene.smoothness, r.composition = scene.blend;
+  if (scene.far) r.far = *scene.far;
+  r.memory = std::min<std::size_t>(common.memory / 2, std::size_t{1} << 30);
+  r.background = scene.background, r.effects = scene.effects, r.legend = scene.legend;
+  r.published = o.published;
+  return r;
+}
+
+// Draws frames one after another and writes each.
+class Film {
+ public:
+  Film(const Options& o, const Common& common, const Scene& scene, Database& db)
+      : o_(o), scene_(scene), device_(Device::open()), renderer_(device_, db, options_of(scene, o, common)) {}
+
+  void shoot(const Camera& view, bool number) {
+    const FrameStats s = renderer_.draw(view);
+    const int k = total.frames;
+    total.add(s);
+    if (o_.stats) per_frame.push_back(facts(s));
+    const auto writing = std::chrono::steady_clock::now();
+    const auto name = [&](const std::string& path) { return number ? numbered(path, k) : path; };
+    write_png(name(o_.out), renderer_.picture());
+    if (!o_.depth.empty()) write_depth(name(o_.depth), renderer_.depth(), scene_.width, scene_.height);
+    total.write += seconds_since(writing);
+  }
+
+  // Another picture for each change that comes within the time.
+  void follow(const Camera& view, Database& db, double seconds) {
+    const auto start = std::chrono::steady_clock::now();
+    while (seconds_since(start) < seconds) {
+      if (renderer_.refresh(db))
+        shoot(view, true);
+      else
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  }
+
+  const std::string& device() const { return device_->name(); }
+  Total total;
+  Json per_frame = Json::array();
+
+ private:
+  const Options& o_;
+  const Scene& scene_;
+  std::shared_ptr<Device> device_;
+  Renderer renderer_;
+};
+
 void run(const Options& o, const Common& common) {
   const auto start = std::chrono::steady_clock::now();
-  const Database db = Database::open(o.database, common.memory);
+  Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
   Scene scene = o.scene.empty() ? Scene{} : read_scene(o.scene);
   if (!o.size.empty()) scene.width = o.size[0], scene.height = o.size[1];
   if (o.pixel_error > 0) scene.pixel_error = o.pixel_error;
   const std::vector<Camera> views = cameras(db, scene);
-  const auto device = Device::open();
-  Renderer renderer(device, db,
-                    {.width = scene.width,
-                     .height = scene.height,
-                     .pixel_error = scene.pixel_error,
-                     .smoothness = scene.smoothness,
-                     .memory = std::min<std::size_t>(common.memory / 2, std::size_t{1} << 30),
-                     .background = scene.background,
-                     .published = o.published,
-                     .effects = scene.effects,
-                     .legend = scene.legend});
-  Total total;
-  Json frames = Json::array();
-  ProgressBar bar(common, "render", double(views.size()), "frames");
-  for (std::size_t k = 0; k < views.size(); ++k) {
-    const FrameStats s = renderer.draw(views[k]);
-    total.add(s);
-    if (o.stats) frames.push_back(facts(s));
-    const auto writing = std::chrono::steady_clock::now();
-    const auto name = [&](const std::string& path) { return scene.path ? numbered(path, int(k)) : path; };
-    write_png(name(o.out), renderer.picture());
-    if (!o.depth.empty()) write_depth(name(o.depth), renderer.depth(), scene.width, scene.height);
-    total.write += seconds_since(writing);
-    bar.show(double(k + 1) / double(views.size()));
+  Film film(o, common, scene, db);
+  {
+    ProgressBar bar(common, "render", double(views.size()), "frames");
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      film.shoot(views[k], scene.path || o.follow > 0);
+      bar.show(double(k + 1) / double(views.size()));
+    }
   }
-  Json document = summary(total, scene, device->name(), seconds_since(start));
-  if (o.stats) document["per_frame"] = frames;
+  if (o.follow > 0) film.follow(views.back(), db, o.follow);
+  const Total& t = film.total;
+  Json document = summary(t, scene, film.device(), seconds_since(start));
+  if (o.stats) document["per_frame"] = film.per_frame;
   if (common.json || o.stats) return print(document);
   if (common.quiet) return;
   fmt::print(
       "{}: {} picture{} of {} x {}, {:.3g} px of error asked, {:.3g} reached, bound at most {:.4g} m, {:.2f} "
       "s\n",
-      o.out, total.frames, total.frames == 1 ? "" : "s", scene.width, scene.height, scene.pixel_error,
-      total.pixels_reached, total.bound_max, seconds_since(start));
+      o.out, t.frames, t.frames == 1 ? "" : "s", scene.width, scene.height, scene.pixel_error,
+      t.pixels_reached, t.bound_max, seconds_since(start));
 }
 
 }  // namespace
@@ -181,6 +217,9 @@ void add_render(CLI::App& app, Common& common) {
   v->add_option("--pixel-error", o->pixel_error, "largest error on the screen, pixels; else the scene's")
       ->check(CLI::PositiveNumber);
   v->add_option("--depth", o->depth, "also writes metres along each pixel's ray (GeoTIFF)");
+  v->add_option("--follow", o->follow,
+                "seconds: another picture, OUT_0001.png, ..., for each change of the database")
+      ->check(CLI::PositiveNumber);
   v->add_flag("--stats", o->stats, "what each frame cost and reached, as JSON");
   v->add_flag("--published", o->published, "tessellates as published, without the guarantee: for comparison");
   v->add_flag("--json", common.json, "one JSON document on stdout");

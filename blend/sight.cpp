@@ -54,8 +54,8 @@ Sight judge(const SightPath& path, const std::vector<SightSample>& samples) {
 // The rays of a wave, step by step.
 class Wave {
  public:
-  Wave(const Blend& blend, std::span<const Ray> rays, const Air& air) : blend_(blend) {
-    for (const Ray& r : rays) paths.emplace_back(r, air);
+  Wave(const Blend& blend, std::span<const SightRay> rays, const Air& air) : blend_(blend) {
+    for (const SightRay& r : rays) paths.emplace_back(r, air);
   }
   std::vector<SightPath> paths;
   std::vector<std::vector<SightSample>> samples;  // of each ray, ascending
@@ -142,7 +142,7 @@ double drop(double distance, const Air& air) {
   return air.curved ? distance * distance * (1 - air.refraction) / (2 * air.radius) : 0;
 }
 
-Ray directed_ray(const Point3& from, double azimuth, double elevation, double distance, const Air& air) {
+SightRay directed_ray(const Point3& from, double azimuth, double elevation, double distance, const Air& air) {
   const double a = azimuth * (M_PI / 180), e = elevation * (M_PI / 180);
   return {from,
           {from.x + distance * std::sin(a), from.y + distance * std::cos(a),
@@ -159,7 +159,7 @@ SightLines::SightLines(const Database& db, std::span<const PatchId> patches, con
 SightLines::~SightLines() = default;
 const Blend& SightLines::surface() const { return impl_->blend; }
 
-std::vector<Sight> SightLines::find(std::span<const Ray> rays, const Air& air) const {
+std::vector<Sight> SightLines::find(std::span<const SightRay> rays, const Air& air) const {
   const SightPlanner& planner = impl_->planner;
   std::vector<Sight> sights(rays.size());
   for (std::size_t from = 0; from < rays.size(); from += kWave) {

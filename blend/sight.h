@@ -23,13 +23,13 @@ struct Air {
 double drop(double distance, const Air& air);
 
 /// Light between two points, at heights as the database has them.
-struct Ray {
+struct SightRay {
   Point3 from, to;
 };
 
 /// The ray that leaves `from` in a direction and ends after `distance` metres along the ground. Degrees:
 /// `azimuth` clockwise from the y axis, `elevation` above the horizontal, below 90 either way.
-Ray directed_ray(const Point3& from, double azimuth, double elevation, double distance, const Air& air);
+SightRay directed_ray(const Point3& from, double azimuth, double elevation, double distance, const Air& air);
 
 enum class Verdict {
   visible,  ///< whatever the terrain is within its bounds; places without data hide nothing
@@ -64,7 +64,7 @@ class SightLines {
   /// blocks of patches; the others are evaluated at every cell line of every patch there, between them, and
   /// wherever humps between these can matter. A first hit is searched for by interpolation,
   /// guarded: the bracket halves with every other evaluation.
-  std::vector<Sight> find(std::span<const Ray> rays, const Air& air) const;
+  std::vector<Sight> find(std::span<const SightRay> rays, const Air& air) const;
 
   const Blend& surface() const;
 

@@ -13,7 +13,7 @@ namespace patchwork {
 struct SightPath {
   double x0, y0, z0, dx, dy, dz, sag;
 
-  SightPath(const Ray& r, const Air& air)
+  SightPath(const SightRay& r, const Air& air)
       : x0(r.from.x), y0(r.from.y), z0(r.from.z), dx(r.to.x - r.from.x), dy(r.to.y - r.from.y) {
     sag = drop(ground(), air);
     dz = r.to.z - r.from.z - sag;

@@ -112,6 +112,12 @@ std::string reason(const std::exception& e) {
 
 }  // namespace
 
+Scene default_scene() {
+  Scene s;
+  s.effects.sun.emplace(), s.effects.tints.emplace();
+  return s;
+}
+
 Scene parse_scene(const std::string& json, const std::string& where) {
   const JsonPlace at{where, ""};
   Json j;

@@ -72,6 +72,9 @@ struct Scene {
   Camera view() const { return {camera->eye, camera->look, camera->fov_degrees, width, height}; }
 };
 
+/// What is shown where no scene is named: all of the terrain, in sunlight, coloured by height.
+Scene default_scene();
+
 /// Throws Error(where, "PLACE: what is wrong", advice), PLACE as in "effects.sun.elevation": no JSON, a
 /// member that is unknown, missing, of the wrong type or out of its range, effects that need or exclude each
 /// other.

@@ -56,7 +56,7 @@ class Rays {
   Rays(const Database& db, const Blend& surface, std::uint64_t seed)
       : db_(db), surface_(surface), random_(seed) {}
 
-  Ray next() {
+  SightRay next() {
     switch (std::uniform_int_distribution<int>(0, 3)(random_)) {
       case 0:
         return anywhere();
@@ -75,18 +75,18 @@ class Rays {
     const Extent e = db_.extent();
     return {uniform(e.xmin, e.xmax), uniform(e.ymin, e.ymax)};
   }
-  Ray over(Point a, Point b, double above_a, double above_b) const {
+  SightRay over(Point a, Point b, double above_a, double above_b) const {
     return {{a.x, a.y, height_at(surface_, a) + above_a}, {b.x, b.y, height_at(surface_, b) + above_b}};
   }
 
-  Ray anywhere() {
+  SightRay anywhere() {
     const Point a = place();
     const double length = uniform(5, 400), angle = uniform(0, 2 * M_PI);
     return over(a, {a.x + length * std::cos(angle), a.y + length * std::sin(angle)}, uniform(-2, 30),
                 uniform(-2, 30));
   }
   // Tangent to the surface within a hundredth of a degree, some millimetres off.
-  Ray grazing() {
+  SightRay grazing() {
     const Point q = place();
     const double angle = uniform(0, 2 * M_PI), half = uniform(2, 150);
     const double cx = std::cos(angle), cy = std::sin(angle);
@@ -108,7 +108,7 @@ class Rays {
     };
     return {pick(s.width()), pick(s.height())};
   }
-  Ray along_the_lattice() {
+  SightRay along_the_lattice() {
     const Grid& g = any_grid();
     const Point v = vertex(g);
     const double n = std::round(uniform(2, 50)), off = uniform(-1, 1);
@@ -116,7 +116,7 @@ class Rays {
     return over(g.info.frame.to_domain(v.x, v.y),
                 g.info.frame.to_domain(v.x + (along_i ? n : 0), v.y + (along_i ? 0 : n)), off, off);
   }
-  Ray through_corners() {
+  SightRay through_corners() {
     const Grid& g = any_grid();
     const Point v = vertex(g);
     const double n = std::round(uniform(1, 40)), slope = uniform(0, 1) < 0.5 ? 1 : -0.5;
@@ -135,7 +135,7 @@ struct March {
   std::vector<double> x, y, above, bound;
   double ground;
 
-  March(const Blend& surface, const Ray& r, const Air& air) {
+  March(const Blend& surface, const SightRay& r, const Air& air) {
     const double dx = r.to.x - r.from.x, dy = r.to.y - r.from.y;
     ground = std::hypot(dx, dy);
     const auto n = std::size_t(std::max(2.0, std::ceil(ground / kStep) + 1));
@@ -165,7 +165,7 @@ struct March {
 };
 
 // False position without a guard: how many evaluations it takes to bring a bracket below a millimetre.
-std::uint32_t naive_steps(const Blend& surface, const Ray& r, const March& m, std::uint32_t most) {
+std::uint32_t naive_steps(const Blend& surface, const SightRay& r, const March& m, std::uint32_t most) {
   std::size_t k = 0;
   while (k < m.above.size() && !(m.above[k] > 0)) ++k;
   if (k == 0 || k == m.above.size() || std::isnan(m.above[k - 1])) return 0;
@@ -194,7 +194,7 @@ TEST_F(GrazingRays, MissNothingThatDenseMarchingSees) {
       const SightLines lines(db(), x.patches, options);
       Rays rays(db(), lines.surface(), seed + std::uint64_t(error) + std::uint64_t(options.smoothness));
       for (std::size_t done = 0; done < each; done += 1024) {
-        std::vector<Ray> some;
+        std::vector<SightRay> some;
         for (std::size_t k = done; k < std::min(each, done + 1024); ++k) some.push_back(rays.next());
         const Air air{.curved = (done / 1024 + std::size_t(options.smoothness)) % 2 == 0,
                       .refraction = 0.13,
@@ -234,13 +234,13 @@ TEST_F(GrazingRays, HitWhereTheSurfaceFirstRisesAboveThem) {
   const Extraction x = extract(db(), {.error = 0});
   const SightLines lines(db(), x.patches, {});
   Rays rays(db(), lines.surface(), test_seed(12));
-  std::vector<Ray> some;
+  std::vector<SightRay> some;
   for (int k = 0; k < 500; ++k) some.push_back(rays.next());
   const std::vector<Sight> found = lines.find(some, kFlat);
   std::size_t hits = 0;
   for (std::size_t k = 0; k < some.size(); ++k) {
     const Sight& s = found[k];
-    const Ray& r = some[k];
+    const SightRay& r = some[k];
     if (std::isfinite(s.clearance)) {
       const double t = s.nearest_distance / std::hypot(r.to.x - r.from.x, r.to.y - r.from.y);
       const double z = r.from.z + t * (r.to.z - r.from.z);
@@ -264,7 +264,7 @@ class LevelPlain : public ::testing::Test {
                 .accuracy = 0.5,
                 .at = [](int, int) { return 50.0; }}}),
         lines_(land_.db(), extract(land_.db(), {.error = 0}).patches, {}) {}
-  Sight look(const Ray& r, const Air& air) const { return lines_.find({&r, 1}, air)[0]; }
+  Sight look(const SightRay& r, const Air& air) const { return lines_.find({&r, 1}, air)[0]; }
   Land land_;
   SightLines lines_;
 };
@@ -276,12 +276,12 @@ TEST_F(LevelPlain, DropsAwayFromALevelLineOfSightAsTheClosedFormSays) {
     const double closed = 1e8 * (1 - refraction) / (2 * radius);
     EXPECT_NEAR(closed, refraction == 0 ? 7.85 : 6.83, 0.005);
     // Level at its end, 10 km away, the ray is there `closed` lower against the plain than at its beginning.
-    const Ray ray{{0, 0, 50 + 10}, {20'000, 0, 50 + 10}};
+    const SightRay ray{{0, 0, 50 + 10}, {20'000, 0, 50 + 10}};
     const Sight s = look(ray, air);
     EXPECT_FALSE(s.blocked);
     EXPECT_NEAR(s.clearance, 10 - closed, 1e-3) << "refraction " << refraction;
     EXPECT_NEAR(s.nearest_distance, 10'000, 30) << "refraction " << refraction;
-    const Ray level = directed_ray({0, 0, 60}, 90, 0, 10'000, air);
+    const SightRay level = directed_ray({0, 0, 60}, 90, 0, 10'000, air);
     EXPECT_NEAR(level.to.x, 10'000, 1e-9);
     EXPECT_NEAR(level.to.z - 60, closed, 1e-3);
   }

@@ -178,7 +178,7 @@ void run(const Options& o, const Common& common) {
   const auto start = std::chrono::steady_clock::now();
   Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
-  Scene scene = o.scene.empty() ? Scene{} : read_scene(o.scene);
+  Scene scene = o.scene.empty() ? default_scene() : read_scene(o.scene);
   if (!o.size.empty()) scene.width = o.size[0], scene.height = o.size[1];
   if (o.pixel_error > 0) scene.pixel_error = o.pixel_error;
   const std::vector<Camera> views = cameras(db, scene);

@@ -136,7 +136,7 @@ void run(const Options& o, const Common& common) {
          .composition = o.blend == "weighted" ? Composition::weighted : Composition::priority});
     if (!o.absolute) raise(rays, lines.surface());
     for (std::size_t from = 0; from < rays.size(); from += kBatch) {
-      std::vector<Ray> some;
+      std::vector<SightRay> some;
       for (std::size_t k = from; k < std::min(rays.size(), from + kBatch); ++k)
         some.push_back({rays[k].from, rays[k].to});
       const std::vector<Sight> found = lines.find(some, o.air);

@@ -9,7 +9,7 @@ namespace {
 
 // Levels below the finest grid's step, where a smooth surface may still bend, or a finer survey may come; and
 // above the one that holds all data, so that some may come beside it.
-constexpr int kFiner = 3, kLarger = 1;
+constexpr int kFiner = 5, kLarger = 1;
 constexpr std::size_t kRuns = 6, kRun = 64;  // records of a level that are looked at: runs of neighbours
 
 double step_of(const GridInfo& g) { return std::min(g.frame.step_i(), g.frame.step_j()); }

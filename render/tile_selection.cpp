@@ -98,7 +98,7 @@ class Selector {
     for (std::uint32_t k = 0; k < out_.leaves.size(); ++k)
       if (out_.leaves[k].drawn) {
         out_.drawn.push_back(k);
-        out_.pixels = std::max(out_.pixels, out_.leaves[k].pixels);
+        if (out_.leaves[k].key.level > 0) out_.pixels = std::max(out_.pixels, out_.leaves[k].pixels);
       }
     std::sort(out_.wanted.begin(), out_.wanted.end(), [](const auto& a, const auto& b) {
       return a.pixels != b.pixels ? a.pixels > b.pixels : a.key < b.key;

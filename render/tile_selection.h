@@ -29,7 +29,8 @@ struct Selection {
   std::vector<Leaf> leaves;                          ///< those that were split have drawn == false
   std::vector<std::uint32_t> drawn;                  ///< places in `leaves`, the largest error first
   std::vector<Wanted> wanted;                        ///< the most wanted first
-  double pixels = 0;                                 ///< error reached: largest of all that is drawn
+  ///< Error reached: the largest of all that is drawn and could be finer.
+  double pixels = 0;
   static constexpr std::uint32_t kSplit = UINT32_MAX;
 
   /// The place of the leaf that holds tile `key` of any level on the side of (x, y) nearest to it, see .cpp.

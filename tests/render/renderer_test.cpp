@@ -279,6 +279,43 @@ TEST_F(InsertionTest, OneFarAwayChangesNoPixel) {
   EXPECT_EQ(bits(r.depth()), before);
 }
 
+// Two hundred views, with a survey more after each dozen: old and new tiles side by side keep to what was
+// asked.
+TEST_F(InsertionTest, TessellationErrorWhileSurveysComeIn) {
+  std::mt19937_64 random(test_seed(24));
+  double worst = 0;  // in the pixels asked for
+  for (const double tau : {0.5, 1.0, 2.0, 4.0}) {
+    GridFolder folder;
+    {
+      Database writer = folder.database();
+      folder.add(writer, surveys()[0], "base");
+    }
+    Database db = Database::open(folder.path("grids.patchwork"));
+    Renderer r(test_device(), db,
+               {.width = kWidth, .height = kHeight, .pixel_error = tau, .memory = std::size_t{128} << 20});
+    Extraction x = extract(db, {.error = 0});
+    auto best = std::make_unique<Blend>(db, x.patches, BlendOptions{.smoothness = 1});
+    for (int n = 0; n < 50; ++n) {
+      if (n % 12 == 11 && n / 12 < 3) {
+        Database writer = folder.database();
+        folder.add(writer, surveys()[std::size_t(n / 12 + 1)], "survey" + std::to_string(n));
+        best.reset();
+        ASSERT_TRUE(r.refresh(db));
+        x = extract(db, {.error = 0});
+        best = std::make_unique<Blend>(db, x.patches, BlendOptions{.smoothness = 1});
+      }
+      const Camera camera = random_camera(db, random);
+      const FrameStats stats = r.draw(camera);
+      EXPECT_LE(stats.pixels_reached, tau);
+      const double error = screen_error(*best, camera, r.depth()).worst;
+      EXPECT_LE(error, tau * 1.001 + 0.01) << "tau " << tau << " view " << n;
+      worst = std::max(worst, error / tau);
+    }
+    EXPECT_EQ(r.cache().find_violation(), "");
+  }
+  std::printf("200 views: at most %.3f of the pixels asked for\n", worst);
+}
+
 TEST_F(InsertionTest, InRealTimeAFlightReachesTheSamePicture) {
   insert(1);
   Database db = reader();

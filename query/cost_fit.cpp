@@ -26,27 +26,30 @@ constexpr Entry kEntries[] = {{"fixed", &CostModel::fixed},
                               {"read_patch", &CostModel::read_patch},
                               {"blend_fixed", &CostModel::blend_fixed},
                               {"blend_patch", &CostModel::blend_patch},
-                              {"sample", &CostModel::sample}};
+                              {"sample", &CostModel::sample},
+                              {"edge", &CostModel::edge}};
+
+constexpr int kCounts = 4;
 
 // What one part of an answer depends on, and what it took.
 struct Observation {
-  std::array<double, 3> counts;
+  std::array<double, kCounts> counts;
   double seconds;
 };
 
 // Costs that would be below zero are left out, the worst one first.
-std::array<double, 3> solve(const std::vector<Observation>& all) {
-  std::array<double, 3> x{};
+std::array<double, kCounts> solve(const std::vector<Observation>& all) {
+  std::array<double, kCounts> x{};
   if (all.empty()) return x;
-  Eigen::MatrixXd a(Eigen::Index(all.size()), 3);
+  Eigen::MatrixXd a(Eigen::Index(all.size()), kCounts);
   for (Eigen::Index r = 0; r < a.rows(); ++r)
-    for (Eigen::Index k = 0; k < 3; ++k)
+    for (Eigen::Index k = 0; k < kCounts; ++k)
       a(r, k) = all[std::size_t(r)].counts[std::size_t(k)] / all[std::size_t(r)].seconds;
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(a.rows());
-  for (int left = 3; left > 0; --left) {
-    const Eigen::Vector3d found = a.completeOrthogonalDecomposition().solve(ones);
+  for (int left = kCounts; left > 0; --left) {
+    const Eigen::Vector4d found = a.completeOrthogonalDecomposition().solve(ones);
     Eigen::Index worst;
-    if (found.minCoeff(&worst) >= 0) return {found[0], found[1], found[2]};
+    if (found.minCoeff(&worst) >= 0) return {found[0], found[1], found[2], found[3]};
     a.col(worst).setZero();
   }
   return x;
@@ -57,9 +60,9 @@ std::array<double, 3> solve(const std::vector<Observation>& all) {
 CostModel fit(std::span<const Measured> answers) {
   std::vector<Observation> find, read, blend;
   for (const Measured& m : answers) {
-    if (m.find > 0) find.push_back({{1, m.pages, m.patches}, m.find});
-    if (m.read > 0) read.push_back({{1, 0, m.patches}, m.read});
-    if (m.blend > 0) blend.push_back({{1, m.samples, m.patches}, m.blend});
+    if (m.find > 0) find.push_back({{1, m.pages, m.patches, 0}, m.find});
+    if (m.read > 0) read.push_back({{1, 0, m.patches, 0}, m.read});
+    if (m.blend > 0) blend.push_back({{1, m.samples, m.patches, std::sqrt(m.patches * m.samples)}, m.blend});
   }
   const auto f = solve(find), r = solve(read), b = solve(blend);
   return {.fixed = f[0],
@@ -69,7 +72,8 @@ CostModel fit(std::span<const Measured> answers) {
           .read_patch = r[2],
           .blend_fixed = b[0],
           .blend_patch = b[2],
-          .sample = b[1]};
+          .sample = b[1],
+          .edge = b[3]};
 }
 
 std::string machine_name() {

@@ -1,6 +1,7 @@
 // What an answer will cost, before it is asked for; and the answer that fits into a time.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -15,13 +16,15 @@ namespace patchwork {
 /// are read for it are in memory; reading and decoding patches from the file; evaluating heights on all
 /// cores.
 struct CostModel {
-  double fixed = 0, page = 0, patch = 0;                ///< finding: at all, a page of the R-tree, a patch
-  double read_fixed = 0, read_patch = 0;                ///< reading: at all, a patch
-  double blend_fixed = 0, blend_patch = 0, sample = 0;  ///< evaluating (k = 0): at all, a patch, a height
+  double fixed = 0, page = 0, patch = 0;    ///< finding: at all, a page of the R-tree, a patch
+  double read_fixed = 0, read_patch = 0;    ///< reading: at all, a patch
+  double blend_fixed = 0, blend_patch = 0;  ///< evaluating (k = 0): at all, a patch
+  double sample = 0, edge = 0;  ///< a height; one along the edges of patches, of which there are about
+                                ///< sqrt(patches * heights)
   double seconds(double pages, double patches) const { return fixed + page * pages + patch * patches; }
   double read_seconds(double patches) const { return read_fixed + read_patch * patches; }
   double blend_seconds(double patches, double samples) const {
-    return blend_fixed + blend_patch * patches + sample * samples;
+    return blend_fixed + blend_patch * patches + sample * samples + edge * std::sqrt(patches * samples);
   }
   bool knows_heights() const { return read_patch > 0 && sample > 0; }  ///< not only how long finding takes
 };

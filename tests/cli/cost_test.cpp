@@ -29,7 +29,7 @@ TEST_F(CostTest, EveryMeasuredErrorKeepsToItsBound) {
   const Json all = rows("out");
   ASSERT_TRUE(all.is_array());
   ASSERT_EQ(all.size(), facts["rows"]);
-  int ladder = 0, bounded = 0, differ = 0;
+  int ladder = 0, bounded = 0, differ = 0, frames = 0;
   for (const Json& r : all) {
     for (const char* key :
          {"knob", "value", "error_asked", "bound", "error_max", "error_p99", "error_rms", "patches", "bytes",
@@ -40,11 +40,16 @@ TEST_F(CostTest, EveryMeasuredErrorKeepsToItsBound) {
     EXPECT_LE(r["error_rms"], r["error_max"]);
     if (r["bound"].is_null()) continue;
     ++bounded, differ += r["error_max"] > 0;
-    EXPECT_LE(r["error_max"], r["bound"]) << r["knob"] << " " << r["value"];
+    const bool drawn = r["knob"] == "frame" || r["knob"] == "tessellation";
+    EXPECT_LE(double(r["error_max"]), double(r["bound"]) * (drawn ? 1.001 : 1) + (drawn ? 0.01 : 0))
+        << r["knob"] << " " << r["value"];
+    frames += drawn;
+    EXPECT_EQ(drawn, !r["ms_draw"].is_null());
     EXPECT_GT(r["patches"], 0);
     EXPECT_GE(r["ms_blend"], 0);
   }
   EXPECT_EQ(ladder, 15);
+  EXPECT_EQ(frames, 6) << "published tessellation has no bound";
   EXPECT_GT(bounded, 50);
   EXPECT_GT(differ, 20) << "negative control: coarser answers depart from the best";
 }

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "blend/vulkan/device.h"
 #include "query/cost_model.h"
+#include "render/camera.h"
 #include "tools/bench/bench.h"
 #include "tools/cli.h"
 
@@ -14,9 +16,7 @@ namespace patchwork::cli {
 struct CostOptions {
   std::string database, folder;
   std::vector<double> extent;  ///< xmin ymin xmax ymax; empty: all, or as much as kMostPatches allow
-  std::vector<double> eye,
-      look;  ///< of the view whose pixel error is a knob; empty: over the south-west corner
-  double fov = 60;
+  std::string scene;     ///< a file; its camera is that of the views; empty: one over the south-west corner
   int side = 512;        ///< heights along each side of the picture
   int runs = 5;          ///< measured; one more comes before to warm up
   int points = 1 << 17;  ///< at which errors are measured
@@ -32,7 +32,7 @@ struct ErrorFigures {
 
 /// Milliseconds of the stages, over the runs. What was not there to be measured has no values.
 struct Stages {
-  std::vector<double> query, fetch, blend;
+  std::vector<double> query, fetch, blend, tessellate, draw;
   std::vector<double> total() const;    ///< of each run
   std::vector<double> at_hand() const;  ///< of each run, without fetch: patches are in memory
 };
@@ -53,6 +53,21 @@ struct CostRow {
   bool fitted = false;                            ///< the model was made from it
   std::size_t beyond = 0;  ///< points farther from the best than both bounds allow, or without an answer
 };
+
+/// A picture of the renderer.
+struct FrameScene {
+  Camera camera;
+  int smoothness = 1;
+  std::size_t memory = 0;  ///< bytes on the card
+};
+/// The scene's camera, the first of its path, or, without either, one over the south-west corner of the
+/// extent. Throws Error: the scene's file.
+FrameScene frame_scene(const Database& db, const Extent& extent, const std::string& scene_file,
+                       std::uint64_t memory);
+/// Pixel errors and ways of tessellating: errors in pixels, measured against the best surface through each
+/// pixel's depth. Throws Error: a device that does not draw.
+std::vector<CostRow> measure_frames(const Database& db, std::shared_ptr<Device> device,
+                                    const FrameScene& scene, int runs);
 
 /// What a time buys: the finest step of the ladder whose median is at most `ms`.
 struct Bargain {

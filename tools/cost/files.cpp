@@ -35,8 +35,8 @@ Json json_of(const CostRow& r) {
          {"error_rms", r.error.rms}, {"patches", r.patches},     {"bytes", r.bytes}};
   Json spreads = Json::object();
   put_stage(spreads, "query", r.ms.query), put_stage(spreads, "fetch", r.ms.fetch);
-  put_stage(spreads, "blend", r.ms.blend), put_stage(spreads, "tessellate", {}),
-      put_stage(spreads, "draw", {});
+  put_stage(spreads, "blend", r.ms.blend), put_stage(spreads, "tessellate", r.ms.tessellate);
+  put_stage(spreads, "draw", r.ms.draw);
   put_stage(spreads, "total", r.ms.total());
   for (const char* stage : {"query", "fetch", "blend", "tessellate", "draw", "total"})
     j[std::string("ms_") + stage] = spreads[std::string("ms_") + stage];

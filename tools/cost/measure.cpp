@@ -71,7 +71,7 @@ class Bench {
     pixel_errors(), bar_.show(0.4);
     blends(), engines(), bar_.show(0.6);
     sides(), thread_counts(), bar_.show(0.7);
-    uniform_grid(), bar_.show(0.8);
+    uniform_grid(), frames(), bar_.show(0.8);
     tolerances(), bar_.show(1);
     return std::move(report_);
   }
@@ -211,15 +211,21 @@ class Bench {
   }
 
   ViewCut view() const {
-    const double w = extent_.xmax - extent_.xmin, h = extent_.ymax - extent_.ymin;
-    ViewCut v{.eye = {extent_.xmin + 0.1 * w, extent_.ymin + 0.1 * h, 0},
-              .look = {extent_.xmin + 0.6 * w, extent_.ymin + 0.6 * h, 0},
-              .fov_degrees = o_.fov};
-    for (const Grid& g : db_.grids()) v.look.z = std::max(v.look.z, g.info.highest);
-    v.eye.z = v.look.z + 0.05 * std::min(w, h);
-    if (o_.eye.size() == 3) v.eye = {o_.eye[0], o_.eye[1], o_.eye[2]};
-    if (o_.look.size() == 3) v.look = {o_.look[0], o_.look[1], o_.look[2]};
-    return over_terrain_of(db_, v);
+    const Camera c = frame_scene(db_, extent_, o_.scene, common_.memory).camera;
+    return over_terrain_of(
+        db_,
+        {.eye = c.eye, .look = c.look, .fov_degrees = c.fov_degrees, .width = c.width, .height = c.height});
+  }
+
+  void frames() {
+    if (!device_) return;
+    try {
+      for (CostRow& row :
+           measure_frames(db_, device_, frame_scene(db_, extent_, o_.scene, common_.memory), o_.runs))
+        report_.rows.push_back(std::move(row));
+    } catch (const Error& e) {
+      report_.notes.push_back(fmt::format("no frame was drawn: {}", e.what()));
+    }
   }
 
   // Pixels a metre at the points that the view sees.

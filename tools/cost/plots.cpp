@@ -25,6 +25,7 @@ set style line 3 lc rgb "#009E73" lw 2 pt 9 ps 0.6
 set style line 4 lc rgb "#777777" lw 2 dt 2 pt 4 ps 0.7
 set style line 5 lc rgb "#E69F00" lw 2 pt 11 ps 0.7
 set style line 6 lc rgb "#000000" lw 2 pt 6 ps 1.6
+set style line 7 lc rgb "#CC79A7" lw 2 pt 7 ps 0.6
 set style arrow 1 heads size screen 0.005,90 lc rgb "#000000" lw 1.5
 set key outside right top vertical Left reverse samplen 2 spacing 1.3 width -2
 set format "%g"
@@ -166,24 +167,38 @@ std::string equal(const CostReport& c, const CostRow& row) {
   return found;
 }
 
-// Columns: place, label, query, fetch, blend, total median min max, uniform grid median min max.
+// Columns: place, label, query, fetch, blend, tessellate, draw, total median min max, uniform grid median min
+// max.
 std::vector<std::string> columns(const CostReport& c, const std::string& knob, bool with_bound) {
   std::vector<std::string> all;
+  const auto stage = [](const std::vector<double>& ms) { return ms.empty() ? 0 : median(ms); };
   for (const std::size_t k : c.of(knob)) {
     const CostRow& r = c.rows[k];
-    const std::string label =
-        with_bound ? fmt::format("{}\\n≤ {} m", r.value, figure(guaranteed(r))) : r.value;
-    all.push_back(fmt::format("{} \"{}\" {} {} {} {} {}", all.size(), label, median(r.ms.query),
-                              median(r.ms.fetch), median(r.ms.blend), spread(r.ms.total()), equal(c, r)));
+    const std::string bound = r.bound ? fmt::format("≤ {} {}", figure(guaranteed(r)), r.unit)
+                                      : fmt::format("measured {} {}", figure(r.error.max), r.unit);
+    all.push_back(fmt::format("{} \"{}{}\" {} {} {} {} {} {} {}", all.size(), r.value,
+                              with_bound ? "\\n" + bound : "", stage(r.ms.query), stage(r.ms.fetch),
+                              stage(r.ms.blend), stage(r.ms.tessellate), stage(r.ms.draw),
+                              spread(r.ms.total()), equal(c, r)));
   }
   return all;
 }
 
-constexpr const char* kStages = "set style fill solid 0.85 noborder\nset boxwidth 0.6\n";
-
 std::string bars(std::size_t n, bool two_lines) {
-  return fmt::format("{}set xrange [-0.6:{}]\nset xlabel offset 0,{}\n", kStages, double(n) - 0.4,
-                     two_lines ? -1 : 0);
+  return fmt::format(
+      "set style fill solid 0.85 noborder\nset boxwidth 0.6\nset xrange [-0.6:{}]\nset xlabel offset 0,{}\n",
+      double(n) - 0.4, two_lines ? -1 : 0);
+}
+
+// Boxes of the sums of stages, the largest first, each times `factor`.
+std::string stack(bool pictures, const std::string& factor) {
+  const auto boxes = [&](const std::string& sum, int style, const std::string& name) {
+    return fmt::format("$data u 1:(({}){}):xtic(2) w boxes ls {} t '{}', ", sum, factor, style, name);
+  };
+  const std::string drawn =
+      pictures ? boxes("$3+$4+$5+$6+$7", 2, "draw") + boxes("$3+$4+$5+$6", 7, "tessellate") : "";
+  return "plot " + drawn + boxes("$3+$4+$5", 1, "blend") + boxes("$3+$4", 3, "fetch, decode") +
+         boxes("$3", 5, "query");
 }
 
 void stacked(Script& s, const CostReport& c, const std::string& knob, const std::string& x) {
@@ -191,24 +206,22 @@ void stacked(Script& s, const CostReport& c, const std::string& knob, const std:
   const std::vector<std::string> data = columns(c, knob, !ladder);
   if (data.empty()) return;
   s.block("data", data);
-  s.picture(
-      ladder ? "stages" : knob,
-      axes(x, "time, ms", "") + bars(data.size(), !ladder) + "set yrange [0:*]\n" +
-          (ladder ? "set xtics rotate by -45\n" : ""),
-      "plot $data u 1:($3+$4+$5):xtic(2) w boxes ls 1 t 'blend', '' u 1:($3+$4) w boxes ls 3 t 'fetch, "
-      "decode', '' u 1:3 w boxes ls 5 t 'query', '' u 1:7:(0):($8-$7) w vectors as 1 t 'total, least to "
-      "most', '' u 1:9:10:11 w yerrorbars ls 4 dt 1 t 'uniform grid, equal error'");
+  const bool pictures = !c.rows[c.of(knob).front()].ms.draw.empty();
+  s.picture(ladder ? "stages" : knob,
+            axes(x, "time, ms", "") + bars(data.size(), !ladder) + "set yrange [0:*]\n" +
+                (ladder ? "set xtics rotate by -45\n" : ""),
+            stack(pictures, "") +
+                "$data u 1:9:(0):($10-$9) w vectors as 1 t 'total, least to most', "
+                "$data u 1:11:12:13 w yerrorbars ls 4 dt 1 t 'uniform grid, equal error'");
 }
 
 void shares(Script& s, const CostReport& c) {
   const std::vector<std::string> data = columns(c, "error", false);
   s.block("data", data);
-  s.picture(
-      "shares",
-      axes("error asked for, metres", "part of the time, %", "") + bars(data.size(), false) +
-          "set yrange [0:100]\nset xtics rotate by -45\n",
-      "plot $data u 1:(100):xtic(2) w boxes ls 1 t 'blend', '' u 1:(100*($3+$4)/($3+$4+$5)) w boxes ls 3 "
-      "t 'fetch, decode', '' u 1:(100*$3/($3+$4+$5)) w boxes ls 5 t 'query'");
+  s.picture("shares",
+            axes("error asked for, metres", "part of the time, %", "") + bars(data.size(), false) +
+                "set yrange [0:100]\nset xtics rotate by -45\n",
+            stack(false, "*100/($3+$4+$5)") + "NaN notitle");
 }
 
 void sides(Script& s, const CostReport& c) {
@@ -250,6 +263,8 @@ std::vector<std::pair<std::string, std::string>> draw_cost(const CostReport& rep
   price(s, report), errors(s, report), bytes(s, report);
   stacked(s, report, "error", "error asked for, metres"), shares(s, report);
   pixels(s, report), sides(s, report);
+  stacked(s, report, "frame", "error on the screen asked for, pixels");
+  stacked(s, report, "tessellation", "tessellation");
   stacked(s, report, "smoothness", "smoothness k"), stacked(s, report, "blend", "blend");
   stacked(s, report, "engine", "engine"), stacked(s, report, "tile", "vertices along a side of a tile");
   stacked(s, report, "threads", "threads"), stacked(s, report, "tolerance", "storage tolerance, metres");

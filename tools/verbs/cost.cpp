@@ -86,10 +86,8 @@ void add_cost(CLI::App& app, Common& common) {
   v->add_option("OUTDIR", o->folder, "where cost.csv, cost.json, the plots and index.html go")->required();
   v->add_option("--extent", o->extent, "xmin ymin xmax ymax of the picture, in the database's CRS")
       ->expected(4);
-  auto* eye = v->add_option("--eye", o->eye, "where the view is seen from: x y z, metres")->expected(3);
-  v->add_option("--look", o->look, "the point in the middle of the view: x y z")->expected(3)->needs(eye);
-  eye->needs("--look");
-  v->add_option("--fov", o->fov, "vertical field of view, degrees");
+  v->add_option("--scene", o->scene, "a scene whose camera and size the views and frames have")
+      ->check(CLI::ExistingFile);
   v->add_option("--size", o->side, "heights along each side of the picture")->check(CLI::Range(64, 4096));
   v->add_option("--runs", o->runs, "measured runs of each setting")->check(CLI::Range(1, 1000));
   v->add_option("--points", o->points, "at which errors are measured")->check(CLI::Range(100, 100'000'000));

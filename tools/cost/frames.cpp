@@ -1,0 +1,125 @@
+// The knobs of a picture: pixel error and the way of tessellating, each frame made from nothing.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "render/camera_path.h"
+#include "render/renderer.h"
+#include "render/scene.h"
+#include "tools/cost/check_points.h"
+
+namespace patchwork::cli {
+
+namespace {
+
+constexpr double kFrameErrors[] = {0.5, 1, 2, 4, 16};  // pixels
+constexpr double kTessellated = 2;                     // pixels: where the ways of tessellating are compared
+// Vertices are placed in float32 and pixels hit between them (tests/render/renderer_test.cpp).
+constexpr double kRoundingPart = 1.001, kRoundingPixels = 0.01;
+
+struct FrameKnob {
+  std::string knob, value;
+  double pixel_error;
+  bool published = false;
+};
+
+class Frames {
+ public:
+  Frames(const Database& db, std::shared_ptr<Device> device, const FrameScene& scene)
+      : db_(db),
+        device_(std::move(device)),
+        scene_(scene),
+        best_(db, extract(db, {.error = 0}).patches, {.smoothness = scene.smoothness}) {}
+
+  CostRow measure(const FrameKnob& k, int runs) const {
+    CostRow row{.knob = k.knob, .value = k.value, .unit = "px", .asked = k.pixel_error};
+    row.samples = double(scene_.camera.width) * scene_.camera.height, row.file_bytes = db_.file_bytes();
+    for (int r = 0; r <= runs; ++r) {
+      Renderer renderer(device_, db_,
+                        {.width = scene_.camera.width,
+                         .height = scene_.camera.height,
+                         .pixel_error = k.pixel_error,
+                         .smoothness = scene_.smoothness,
+                         .memory = scene_.memory,
+                         .published = k.published});
+      const FrameStats s = renderer.draw(scene_.camera);
+      if (r == 0) judge(renderer, s, k.published, row);
+      if (r > 0) add(s, row.ms);
+    }
+    return row;
+  }
+
+ private:
+  static void add(const FrameStats& s, Stages& ms) {
+    ms.query.push_back(s.select_ms + s.extract_ms), ms.fetch.push_back(s.send_ms);
+    ms.blend.push_back(s.blend_ms), ms.tessellate.push_back(s.finish_ms + s.factors_ms);
+    ms.draw.push_back(s.draw_ms);
+  }
+
+  // Vertical distance of what each pixel shows to the best surface there, as it is seen, in pixels.
+  std::vector<double> distances(const std::vector<float>& depth) const {
+    const Camera& camera = scene_.camera;
+    std::vector<double> x, y, z, scale;
+    for (int r = 0; r < camera.height; ++r)
+      for (int c = 0; c < camera.width; ++c) {
+        const float d = depth[std::size_t(r) * std::size_t(camera.width) + std::size_t(c)];
+        if (std::isnan(d)) continue;
+        const glm::dvec3 p = ray(camera, c, r).at(double(d));
+        const Seen low = see(camera, {p.x, p.y, p.z - 0.005}), high = see(camera, {p.x, p.y, p.z + 0.005});
+        x.push_back(p.x), y.push_back(p.y), z.push_back(p.z);
+        scale.push_back(std::hypot(high.x - low.x, high.y - low.y) / 0.01);
+      }
+    std::vector<double> height(x.size()), all;
+    best_.at_points(x, y, {.height = height, .bound = {}, .source = {}, .patch = {}});
+    for (std::size_t k = 0; k < x.size(); ++k)  // the outline of the data is drawn to a cell
+      if (!std::isnan(height[k])) all.push_back(std::abs(z[k] - height[k]) * scale[k]);
+    return all;
+  }
+
+  void judge(const Renderer& renderer, const FrameStats& s, bool published, CostRow& row) const {
+    std::vector<double> off = distances(renderer.depth());
+    row.patches = s.patches_sent, row.bytes = s.bytes_up;
+    if (!published) {
+      row.bound = row.bound_p99 = s.pixels_reached;
+      for (const double d : off) row.beyond += d > s.pixels_reached * kRoundingPart + kRoundingPixels;
+    }
+    row.error = figures_of(off);
+  }
+
+  const Database& db_;
+  std::shared_ptr<Device> device_;
+  const FrameScene& scene_;
+  Blend best_;
+};
+
+}  // namespace
+
+FrameScene frame_scene(const Database& db, const Extent& e, const std::string& file, std::uint64_t memory) {
+  const Scene scene = file.empty() ? Scene{} : read_scene(file);
+  FrameScene f{.camera = {{}, {}, 60, scene.width, scene.height},
+               .smoothness = scene.smoothness,
+               .memory = std::min<std::size_t>(memory / 2, std::size_t{1} << 30)};
+  if (scene.camera) f.camera = scene.view();
+  if (scene.path) f.camera = CameraPath(*scene.path).frame(0, scene.width, scene.height);
+  if (scene.camera || scene.path) return f;
+  const double w = e.xmax - e.xmin, h = e.ymax - e.ymin;
+  f.camera.eye = {e.xmin + 0.1 * w, e.ymin + 0.1 * h, 0};
+  f.camera.look = {e.xmin + 0.6 * w, e.ymin + 0.6 * h, -INFINITY};
+  for (const Grid& g : db.grids()) f.camera.look.z = std::max(f.camera.look.z, g.info.highest);
+  f.camera.eye.z = f.camera.look.z + 0.05 * std::min(w, h);
+  return f;
+}
+
+std::vector<CostRow> measure_frames(const Database& db, std::shared_ptr<Device> device,
+                                    const FrameScene& scene, int runs) {
+  const Frames frames(db, std::move(device), scene);
+  std::vector<CostRow> rows;
+  for (const double pixels : kFrameErrors)
+    rows.push_back(frames.measure({"frame", fmt::format("{:g}", pixels), pixels}, runs));
+  for (const bool published : {false, true})
+    rows.push_back(frames.measure(
+        {"tessellation", published ? "published" : "conservative", kTessellated, published}, runs));
+  return rows;
+}
+
+}  // namespace patchwork::cli

@@ -6,6 +6,7 @@
 
 #include "blend/kernels.h"
 #include "tests/blend/scene.h"
+#include "tests/hard_case.h"
 
 namespace patchwork {
 namespace {
@@ -59,6 +60,7 @@ TEST(SourceExact, AVertexOfTheMostAccurateGridInsideItsKernelGivesTheStoredValue
     const BlendOptions weighted{.smoothness = k, .composition = Composition::weighted};
     EXPECT_NE(evaluate(scene.db(), 0, points, weighted).height, stored) << "negative control: a mean";
   }
+  report_law("SourceExact", "vertices give the stored value to the last bit, k = 0, 1, 2", 3 * points.size());
 }
 
 TEST(PartitionOfUnity, ConstantTerrainIsReproducedToTheLastBit) {
@@ -79,6 +81,7 @@ TEST(PartitionOfUnity, ConstantTerrainIsReproducedToTheLastBit) {
       }
     EXPECT_GT(answered, points.size() / 2);
   }
+  report_law("PartitionOfUnity", "constant terrain to the last bit, every patch there is", 6 * points.size());
 }
 
 TEST(PartitionOfUnity, ThePlainSumOfTheWeightsIsNotOne) {
@@ -102,13 +105,16 @@ TEST(PartitionOfUnity, ASharedPlaneIsReproduced) {
   std::mt19937_64 random(test_seed(3));
   const Points points = random_points(scene.db().extent(), 20000, random);
   const std::vector<PatchId> all = every_patch(scene.db());
+  double worst = 0;
   for (const BlendOptions& options : all_blends()) {
     const Answers a = evaluate(scene.db(), all, points, options);
     for (std::size_t k = 0; k < points.size(); ++k)
       if (a.source[k] != 0) {
         ASSERT_NEAR(a.height[k], plane(points.x[k], points.y[k]), 1e-12 * 500) << name_of(options);
+        worst = std::max(worst, std::abs(a.height[k] - plane(points.x[k], points.y[k])));
       }
   }
+  report_case("PartitionOfUnity", "a shared plane, 500 m of relief", 6 * points.size(), worst, 5e-10, "m");
 }
 
 class RimWeights : public ::testing::TestWithParam<bool> {};  // pixel is area
@@ -147,6 +153,20 @@ TEST_P(RimWeights, PointsJustInsideTheRimOfAllDataAnswerWithWhatTheGridsSay) {
         ASSERT_GT(a.source[k], 0);
       }
     }
+  report_law("RimWeights", "finite and between the grids, 0 to 1e-5 m inside the rim", 12 * points.size());
+}
+
+// The naive form: a mean of heights with the plain ramps as weights, in float32.
+TEST(RimWeights, PlainWeightsInFloatUnderflowToNothing) {
+  const GridShape shape(40, 40, true);
+  const LatticeRect kernel = shape.kernel(0, 0, 0), domain = shape.domain(0, 0, 0);
+  const double at[] = {domain.i0, domain.i0 + 1e-14, domain.i0 + 1e-11, domain.i0 + 1e-8};
+  double ramp[4];
+  kernels::ramp_weights(2, kernel, domain, domain, at, at, 4, ramp);
+  for (const double w : ramp) {
+    const float weight = float(w), mean = weight * 10.0f / weight;
+    EXPECT_TRUE(std::isnan(mean)) << "negative control: 0 / 0 at weight " << w;
+  }
 }
 
 TEST_P(RimWeights, PointsJustOutsideHaveNoData) {
@@ -164,6 +184,10 @@ TEST_P(RimWeights, PointsJustOutsideHaveNoData) {
 INSTANTIATE_TEST_SUITE_P(Registration, RimWeights, ::testing::Bool(),
                          [](const auto& p) { return std::string(p.param ? "Area" : "Point"); });
 
+std::string fmt_origin(Point p) {
+  return "the same grids moved by (" + std::to_string(long(p.x)) + ", " + std::to_string(long(p.y)) + ") m";
+}
+
 TEST(FarOrigin, TheSameGridsTenThousandKilometresAwayGiveTheSameHeights) {
   // Metres: 1e-6 of a cell of the base (20 m) on slopes of 1 at most.
   constexpr double kTolerance = 2e-5;
@@ -173,6 +197,7 @@ TEST(FarOrigin, TheSameGridsTenThousandKilometresAwayGiveTheSameHeights) {
     std::vector<GridFile> far = near;
     for (GridFile& g : far) g.geotransform[0] += offset.x, g.geotransform[3] += offset.y;
     const Land here(near), there(far);
+    double worst = 0;
     Points a = random_points(here.db().extent(), 5000, random), b;
     for (std::size_t k = 0; k < a.size(); ++k) {
       a.x[k] = std::round(a.x[k] * 64) / 64, a.y[k] = std::round(a.y[k] * 64) / 64;
@@ -186,8 +211,10 @@ TEST(FarOrigin, TheSameGridsTenThousandKilometresAwayGiveTheSameHeights) {
           if (p.source[k] == 0) continue;
           ASSERT_NEAR(p.height[k], q.height[k], kTolerance) << name_of(options);
           ASSERT_NEAR(p.bound[k], q.bound[k], kTolerance) << name_of(options);
+          worst = std::max(worst, std::abs(p.height[k] - q.height[k]));
         }
       }
+    report_case("FarOrigin", fmt_origin(offset), 12 * a.size(), worst, kTolerance, "m");
     EXPECT_GT(std::abs(double(float(b.x[0])) - b.x[0]) + std::abs(double(float(b.y[0])) - b.y[0]), 1e-3)
         << "negative control: float32 coordinates would not do";
   }
@@ -206,12 +233,14 @@ TEST(RatioOfScales, ACentimetreGridOnAKilometreGridIsImportedAndReadInBoundedTim
   for (int j = 12; j < 288; j += 3)
     for (int i = 12; i < 288; i += 3) inside.add(frame.to_domain(i, j)), stored.push_back(drone.at(i, j));
   for (int k = 0; k < 1000; ++k) outside.add(500 + 59.0 * k, 500 + 57.0 * k);
+  double worst = 0;
   for (const BlendOptions& options : all_blends()) {
     const Answers fine = evaluate(scene.db(), 0, inside, options);
     const Answers coarse = evaluate(scene.db(), 0, outside, options);
     for (std::size_t k = 0; k < inside.size(); ++k) {
       if (options.composition == Composition::priority) {
         ASSERT_NEAR(fine.height[k], stored[k], 1e-6);
+        worst = std::max(worst, std::abs(fine.height[k] - stored[k]));
       }
       ASSERT_LE(std::abs(fine.height[k] - stored[k]), fine.bound[k]);
     }
@@ -219,6 +248,11 @@ TEST(RatioOfScales, ACentimetreGridOnAKilometreGridIsImportedAndReadInBoundedTim
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   EXPECT_LT(seconds.count(), 20) << "recursion per cell would take minutes";
+  report_case("RatioOfScales", "1 cm cells on 1 km cells: stored values", 6 * inside.size(), worst, 1e-6,
+              "m");
+  // The naive form splits every cell of the coarse grid that the fine one touches down to the fine step.
+  const double cells = std::pow(1000 / 0.01, 2);
+  EXPECT_GT(cells, 1e5 * double(scene.db().tree().size())) << "negative control: boxes, not cells, are kept";
 }
 
 class SplineStencil : public ::testing::Test {
@@ -253,6 +287,34 @@ TEST_F(SplineStencil, NeighbouringPatchesOfALevelAgreeInTheirOverlap) {
         ++overlaps;
       }
   EXPECT_GT(overlaps, 10u);
+  report_law("SplineStencil", "neighbours of a level agree to the last bit, spikes of 5 km",
+             overlaps * 3 * 65 * 65);
+}
+
+// The naive form: a natural spline of each patch's own samples. Second derivatives of n samples a unit apart.
+std::vector<double> natural_spline(const std::vector<double>& h) {
+  const std::size_t n = h.size();
+  std::vector<double> m(n, 0), diagonal(n, 4), right(n, 0);
+  for (std::size_t k = 1; k + 1 < n; ++k) right[k] = 6 * (h[k - 1] - 2 * h[k] + h[k + 1]);
+  for (std::size_t k = 2; k + 1 < n; ++k)
+    diagonal[k] -= 1 / diagonal[k - 1], right[k] -= right[k - 1] / diagonal[k - 1];
+  for (std::size_t k = n - 2; k > 0; --k) m[k] = (right[k] - m[k + 1]) / diagonal[k];
+  return m;
+}
+
+TEST_F(SplineStencil, NaturalEndsWouldTearNeighboursApart) {
+  const GridFile file = spikes();
+  const auto row = [&](int first, int n) {
+    std::vector<double> h;
+    for (int i = first; i < first + n; ++i) h.push_back(file.at(i, 40));
+    return h;
+  };
+  // Two patches of 33 samples that share five of them, in the middle of the second shared cell.
+  const std::vector<double> a = row(0, 33), b = row(28, 33), ma = natural_spline(a), mb = natural_spline(b);
+  const auto middle = [](const std::vector<double>& h, const std::vector<double>& m, std::size_t k) {
+    return (h[k] + h[k + 1]) / 2 - (m[k] + m[k + 1]) / 16;
+  };
+  EXPECT_GT(std::abs(middle(a, ma, 29) - middle(b, mb, 1)), 0.1) << "negative control: decimetres apart";
 }
 
 TEST_F(SplineStencil, SpikesStayWithinTheBoundAndFinite) {
@@ -261,6 +323,7 @@ TEST_F(SplineStencil, SpikesStayWithinTheBoundAndFinite) {
   const Grid& g = scene.db().grids()[0];
   std::mt19937_64 random(test_seed(5));
   const Points points = random_points(scene.db().extent(), 20000, random);
+  double worst = 0;
   for (const BlendOptions& options : all_blends()) {
     const Answers a = evaluate(scene.db(), 0, points, options);
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -271,8 +334,11 @@ TEST_F(SplineStencil, SpikesStayWithinTheBoundAndFinite) {
       const double h = (1 - t) * ((1 - s) * file.at(i, j) + s * file.at(i + 1, j)) +
                        t * ((1 - s) * file.at(i, j + 1) + s * file.at(i + 1, j + 1));
       ASSERT_LE(std::abs(a.height[k] - h), a.bound[k]) << name_of(options);
+      worst = std::max(worst, std::abs(a.height[k] - h) / a.bound[k]);
     }
   }
+  report_case("SplineStencil", "spikes of 5 km keep to the bound", 6 * points.size(), worst, 1,
+              "of the bound");
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/blend/scene.h"
+#include "tests/hard_case.h"
 
 namespace patchwork {
 namespace {
@@ -90,6 +91,21 @@ TEST_P(NodataEdges, EveryValidCellAnswersAtEveryErrorUpToItsCorners) {
         ASSERT_TRUE(a.height[k] > 85 && a.height[k] < 115) << "nodata leaks: " << a.height[k];
       }
     }
+  report_law("NodataEdges", std::string("valid cells answer at every error, ") + GetParam().name,
+             36 * points.size());
+}
+
+// The naive form: bilinear between samples of which some are -9999.
+TEST_P(NodataEdges, PlainInterpolationWouldLeak) {
+  std::size_t leaks = 0;
+  for (int j = 0; j + 1 < file_.height; ++j)
+    for (int i = 0; i + 1 < file_.width; ++i) {
+      double sum = 0;
+      for (const auto& [a, b] : {std::pair{i, j}, {i + 1, j}, {i, j + 1}, {i + 1, j + 1}})
+        sum += GetParam().at(a, b) ? -9999 : file_.at(a, b);
+      leaks += sum / 4 < 85 && sum / 4 > -9998;
+    }
+  EXPECT_GT(leaks, 0u) << "negative control";
 }
 
 TEST_P(NodataEdges, HolesAreExactAtLevelZeroAndToTheErrorAboveIt) {

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "tests/blend/scene.h"
+#include "tests/hard_case.h"
 
 namespace patchwork {
 namespace {
@@ -35,6 +36,21 @@ TEST_F(SummationOrder, SameBitsForAnyNumberOfThreads) {
     }
     for (const Answers& a : answers) EXPECT_TRUE(a == answers[0]) << name_of(options);
   }
+  report_law("SummationOrder", "the same bits on 1 to 8 threads", 24 * points.size());
+}
+
+// The naive form: five weighted terms in float32 in the order in which they come.
+TEST_F(SummationOrder, SumsInTheOrderOfArrivalWouldChangeBits) {
+  std::mt19937_64 random(test_seed(5));
+  std::uniform_real_distribution<float> weight(0, 1), height(0, 2000);
+  int changed = 0;
+  for (int n = 0; n < 10000; ++n) {
+    float w[5], h[5], up = 0, down = 0;
+    for (int k = 0; k < 5; ++k) w[k] = weight(random), h[k] = height(random);
+    for (int k = 0; k < 5; ++k) up += w[k] * h[k], down += w[4 - k] * h[4 - k];
+    changed += up != down;
+  }
+  EXPECT_GT(changed, 3000) << "negative control";
 }
 
 TEST_F(SummationOrder, SameBitsForAnyOrderOfThePoints) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/blend/vulkan_scene.h"
+#include "tests/hard_case.h"
 
 namespace patchwork {
 namespace {
@@ -19,9 +20,8 @@ class CpuGpuParity : public VulkanTest {
       const Answers gpu = at_pixels(VulkanBlend(test_device(), db, patches, options), raster, side);
       all.add(expect_parity(cpu, gpu, what + " " + name_of(options)));
     }
-    std::printf("%-32s %zu points, %zu answered, worst %.4f of the limit\n", what.c_str(), all.points,
-                all.answered, all.worst);
     EXPECT_GT(all.answered, 0u) << what;
+    report_case("CpuGpuParity", what, all.points, all.worst, 1, "of 1 mm + 1e-6 of the height");
     return all;
   }
   static void compare(const Land& scene, std::initializer_list<double> errors, double degrees,

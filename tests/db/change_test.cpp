@@ -11,6 +11,7 @@
 #include "tests/db/databases.h"
 #include "tests/db/model.h"
 #include "tests/grids.h"
+#include "tests/hard_case.h"
 #include "tests/seed.h"
 
 namespace patchwork {
@@ -163,6 +164,7 @@ TEST(Change, RandomInsertsRemovalsAndReopeningsAgreeWithTheModelAfterEveryStep) 
   }
   EXPECT_GE(most, 4u);
   EXPECT_GT(trial.sets(), 20u);
+  report_law("InsertRemove", "random insertions, removals and reopenings", std::uint64_t(trials(400)));
 }
 
 TEST(InsertRemove, GivesBackTheDatabaseThatNeverSawTheGrid) {

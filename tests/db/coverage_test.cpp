@@ -11,6 +11,7 @@
 
 #include "db/coverage_exact.h"
 #include "tests/db/coverage_scenes.h"
+#include "tests/hard_case.h"
 
 namespace patchwork {
 namespace {
@@ -56,6 +57,8 @@ TEST(CoverageRotatedNesting, ParentCoversItsChildrenAndTheyCoverIt) {
   EXPECT_EQ(own.interval + own.exact, 0u) << "one frame is decided by integers";
   EXPECT_GT(foreign.exact, 0u);
   EXPECT_GT(missed_by_rounded_corners, 0) << "negative control: rounded corners must miss children";
+  report_law("CoverageRotatedNesting", "parents and children, 7 angles, 3 origins",
+             own.integer + foreign.interval + foreign.exact);
 }
 
 TEST(CoverageAbutting, ASeamOfOneUlpIsClosedByGrowthAlone) {
@@ -78,6 +81,7 @@ TEST(CoverageAbutting, ASeamOfOneUlpIsClosedByGrowthAlone) {
   EXPECT_TRUE(two_tiles(seam, false));
   EXPECT_TRUE(two_tiles(overlap, false));
   EXPECT_FALSE(two_tiles(gap, false)) << "negative control: without growth the hairline is real";
+  report_law("CoverageAbutting", "seams of one ulp, 1e7 m from the origin", 6);
 }
 
 TEST(CoverageAbutting, RotatedTilesWhoseAnchorsWereRounded) {
@@ -133,6 +137,8 @@ TEST(CoverageSliver, GrowthClosesAHairlineAndNothingWider) {
       for (const double gap : {0.0, 1.0 / 512, 1.0 / 2048}) wrong += h.covered_by_area(gap) != (gap == 0);
     }
   EXPECT_GT(wrong, 0) << "negative control: areas in double decide by rounding";
+  report_law("CoverageSliver", "gaps of 1/256 to 1/2048 cell, steps of 1 cm to 30 m, 1e7 m from the origin",
+             12 * 8);
 }
 
 TEST(CoverageSliver, ACoverThatEndsShortOfTheTarget) {

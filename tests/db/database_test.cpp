@@ -14,6 +14,7 @@
 #include "tests/db/database_files.h"
 #include "tests/db/databases.h"
 #include "tests/grids.h"
+#include "tests/hard_case.h"
 #include "tests/seed.h"
 
 namespace patchwork {
@@ -107,6 +108,7 @@ TEST_P(OrderPermutations, OfSixOverlappingGridsGiveOneHash) {
   GridFile other = files[2];
   other.at = [at = other.at](int i, int j) { return at(i, j) + (i == 3 && j == 4); };
   EXPECT_NE(orders.replaced(other, 2), expected) << "negative control: one other sample";
+  report_law("OrderPermutations", "orders of six overlapping grids", std::uint64_t(tried));
 }
 
 INSTANTIATE_TEST_SUITE_P(First, OrderPermutations, testing::Range(0, 6));
@@ -122,6 +124,7 @@ TEST(OrderPermutations, ShufflesOfFortyGridsGiveOneHash) {
     std::shuffle(order.begin(), order.end(), random);
     ASSERT_EQ(orders.hash(order), expected) << testing::PrintToString(order);
   }
+  report_law("OrderPermutations", "shuffles of forty grids", std::uint64_t(shuffles()));
 }
 
 // --- EqualGrids.

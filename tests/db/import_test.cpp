@@ -7,6 +7,7 @@
 #include "db/ingest.h"
 #include "tests/db/databases.h"
 #include "tests/grids.h"
+#include "tests/hard_case.h"
 #include "tests/seed.h"
 
 namespace patchwork {
@@ -152,6 +153,7 @@ TEST(QuantiseTies, ExactHalfStepsStayWithinTheStatedError) {
         GDT_Float64, 1, [=](int n) { return n == 7 ? at + std::exp2(-12) : at + (n - 600 + 0.5) / 16; }));
     EXPECT_EQ(s.quantisation, 1.0 / 32);
     EXPECT_EQ(s.worst, s.quantisation) << "half steps are the worst case, and no worse";
+    report_case("QuantiseTies", "exact half steps of 1/16 m", 1200, s.worst, s.quantisation, "m");
     EXPECT_GT(s.inexact, 1000) << "negative control: they are not stored exactly";
   }
 }
@@ -175,6 +177,27 @@ TEST(QuantiseTies, CliffsAndSpikesAreStoredAsTheyAre) {
     return n % 3 == 0 ? 32767 : n % 3 == 1 ? -32768 : 0;
   }));
   EXPECT_EQ(s.inexact, 0);
+  report_case("QuantiseTies", "cliffs and spikes of 65 535 m", 1200, s.worst, 0, "m");
+}
+
+// The naive form: each sample is predicted from the ones before it, by the encoder in double and by the
+// decoder in float32, and only the rounded residual is stored.
+TEST(QuantiseTies, PredictingInFloatsWouldLoseSamples) {
+  constexpr double q = 0.1;
+  std::mt19937_64 random(test_seed(6));
+  std::uniform_real_distribution<double> slope(-3, 3);
+  double height = 8000, wide = 0, wide_before = 0;
+  float narrow = 0, narrow_before = 0;
+  int beyond = 0;
+  for (int n = 0; n < 10000; ++n) {
+    height += slope(random);
+    const double residual = std::round((height - (2 * wide - wide_before)) / (2 * q));
+    const double next = 2 * wide - wide_before + residual * 2 * q;
+    const float decoded = 2 * narrow - narrow_before + float(residual) * float(2 * q);
+    beyond += std::abs(double(decoded) - height) > q;
+    wide_before = wide, wide = next, narrow_before = narrow, narrow = decoded;
+  }
+  EXPECT_GT(beyond, 100) << "negative control: codes are integers, and so are their predictions";
 }
 
 // --- DegenerateGrids.
@@ -193,14 +216,18 @@ TEST(DegenerateGrids, RefusedOnesLeaveNothingBehind) {
             std::string::npos);
   EXPECT_EQ(db.grids().size(), 1u);
   EXPECT_EQ(db.content_hash(), hash);
+  report_law("DegenerateGrids", "lines, points and shears are refused whole", 4);
 }
 
 TEST(DegenerateGrids, FramesWithoutAnInverseAreRefused) {
   using Numbers = std::array<double, 6>;
   for (const Numbers& n :
        {Numbers{0, 0, 0, 0, 0, -1}, Numbers{0, 1, 0, 0, 0, 0}, Numbers{0, 1, 1, 0, 1, 1},
-        Numbers{0, INFINITY, 0, 0, 0, 1}, Numbers{NAN, 1, 0, 0, 0, 1}, Numbers{0, 1e200, 0, 0, 0, 1e200}})
+        Numbers{0, INFINITY, 0, 0, 0, 1}, Numbers{NAN, 1, 0, 0, 0, 1}, Numbers{0, 1e200, 0, 0, 0, 1e200}}) {
     EXPECT_NE(refusal_of([&] { Frame::from_geotransform(n, "grid"); }), "");
+    const double naive = n[0] + n[5] / (n[1] * n[5] - n[2] * n[4]);
+    EXPECT_FALSE(std::isfinite(naive) && naive != 0) << "negative control: the plain inverse is of no use";
+  }
   EXPECT_EQ(refusal_of([&] { Frame::from_geotransform({0, 1, 0, 0, 0, -1}, "grid"); }), "");
 }
 

@@ -1,0 +1,8 @@
+// Linked into every test of the preset `thread`: TBB works on the calling thread alone. Its library is not
+// instrumented, so what it hands from thread to thread would look like races; threads that tests start
+// themselves are watched.
+#include <oneapi/tbb/global_control.h>
+
+namespace {
+const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+}

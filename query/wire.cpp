@@ -62,6 +62,11 @@ class Reader {
     if (!std::isfinite(value)) refuse("it holds a number that is none");
     return value;
   }
+  double error() {
+    const double value = metres();
+    if (value < 0) refuse("it holds an error below zero");
+    return value;
+  }
   std::uint32_t at_most(std::uint32_t most) {
     const auto value = get<std::uint32_t>();
     if (value > most) refuse("it states an impossible number");
@@ -143,7 +148,7 @@ Update::Source get_source(Reader& r) {
   const std::uint32_t width = r.at_most(1u << 24), height = r.at_most(1u << 24), area = r.at_most(1);
   if (width < 2 || height < 2) refuse("a grid of it has no cells");
   s.shape = GridShape(int(width), int(height), area != 0);
-  s.quantum = r.metres(), s.base = r.metres(), s.rim_error = r.metres();
+  s.quantum = r.metres(), s.base = r.metres(), s.rim_error = r.error();
   s.code_origin = r.get<std::int64_t>();
   return s;
 }
@@ -163,8 +168,8 @@ Update::Patch get_patch(Reader& r, const std::vector<Update::Source>& sources) {
   Update::Patch p;
   PatchSurface& s = p.surface;
   s.id.value = r.get<std::uint64_t>(), s.level = s.id.level();
-  for (double& e : p.error) e = r.metres();
-  p.bottom = r.metres();
+  for (double& e : p.error) e = r.error();
+  p.bottom = r.error();
   const auto of = std::find_if(sources.begin(), sources.end(),
                                [&](const Update::Source& g) { return g.id == s.id.grid(); });
   if (of == sources.end()) refuse("a patch of it belongs to no grid");

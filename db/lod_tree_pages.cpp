@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::uint64_t kFormat = 2;
 constexpr std::size_t kHeaderBytes = 24;
+constexpr std::size_t kMostPages = std::size_t{1} << 24;  // 10^9 boxes; what a hostile header may ask for
 
 void put(std::vector<std::byte>& out, std::uint64_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) out.push_back(std::byte(value >> 8 * i));
@@ -46,7 +47,7 @@ LodTree LodTree::open(std::span<const std::byte> header, const ReadPage& read) {
   LodTree tree;
   const std::size_t size = get(header, 20, 4), free = (header.size() - kHeaderBytes) / 4;
   tree.root_ = std::uint32_t(get(header, 4, 4)), tree.size_ = std::size_t(get(header, 12, 8));
-  if (free >= size || size > most_pages(size - free) || size - free > tree.size_ + 1)
+  if (free >= size || size > kMostPages || size > most_pages(size - free) || size - free > tree.size_ + 1)
     refuse("its header states an impossible size");
   if (tree.root_ >= size) refuse("the root is no page");
   tree.free_.clear();

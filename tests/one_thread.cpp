@@ -6,3 +6,7 @@
 namespace {
 const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
 }
+
+// GDAL takes its own locks in either order; that is not ours to mend.
+extern "C" const char* __tsan_default_suppressions();
+extern "C" const char* __tsan_default_suppressions() { return "deadlock:libgdal.so\n"; }

@@ -24,7 +24,7 @@ void only_common_formats() {
     const std::string name = all.GetDriver(k)->GetDescription();
     bool common = false;
     for (const char* f : kFormats) common |= name == f;
-    if (!common) all.DeregisterDriver(all.GetDriver(k));
+    if (!common) GDALDestroyDriver(all.GetDriver(k));
   }
   CPLSetErrorHandler(CPLQuietErrorHandler);
 }

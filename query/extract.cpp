@@ -7,6 +7,7 @@
 
 #include "db/error.h"
 #include "db/invariant.h"
+#include "query/found.h"
 
 namespace patchwork {
 
@@ -15,39 +16,11 @@ namespace {
 constexpr double kBudgetFinest = 0x1p-20;  // of the largest error: where the search for a budget begins
 constexpr int kBudgetSteps = 24;  // halvings of those 20 octaves: the error is found to 2^-19 octaves
 
-struct Found {
-  double bottom;
-  double kernel;  // area in level-0 cells: orders patches of one grid exactly
-  const Grid* grid;
-  std::size_t index;
-  PatchId id;
-};
-
-// The bound where the patch speaks: beyond the outer samples of its grid it is larger.
-double bound_of(const Found& f) {
-  const GridShape& shape = f.grid->info.shape;
-  const LatticeRect d = shape.domain(f.id.level(), f.id.bx(), f.id.by());
-  const bool beyond = d.i0 < 0 || d.j0 < 0 || d.i1 > shape.width() - 1 || d.j1 > shape.height() - 1;
-  return beyond ? f.bottom + f.grid->info.rim_error : f.bottom;
-}
-
-// By bottom; ties by the order, the greater first. Ties are many, because a survey's finest patches tend to
-// be as good as the survey: within a grid they are told apart by two numbers.
-void sort_by_priority(std::vector<Found>& found) {
-  std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
-    if (a.bottom != b.bottom) return a.bottom < b.bottom;
-    if (a.grid == b.grid) return a.kernel != b.kernel ? a.kernel > b.kernel : a.index > b.index;
-    CoverageCounts ignored;
-    return less(*b.grid, b.index, *a.grid, a.index, ignored);
-  });
-}
-
 }  // namespace
 
 Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
   const auto start = std::chrono::steady_clock::now();
-  Extraction result;
-  std::vector<Found> found;
+  std::vector<FoundPatch> found;
   double largest_asked = 0;
   const Database::Reading reading = db.reading();
   const Grid* last = nullptr;  // neighbours in the tree are mostly of one grid
@@ -68,16 +41,10 @@ Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
   };
   const VisitCost visited =
       db.tree().visit([&](const LodPage& page, bool inside) { return cut.hits(page, inside); }, emit);
-  sort_by_priority(found);
-  for (const Found& f : found) {
-    result.patches.push_back(f.id);
-    result.bound_max = std::max(result.bound_max, bound_of(f));
-  }
+  Extraction result = in_order(found);
   if (strict) result.bound_max = std::min(result.bound_max, largest_asked);
-  result.error_available = found.empty() ? 0 : found.front().bottom;
-  const std::size_t bytes = found.size() * sizeof(PatchSurface::codes);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  result.cost = {visited.nodes, visited.boxes, found.size(), bytes, seconds.count()};
+  result.cost.nodes = visited.nodes, result.cost.boxes = visited.boxes, result.cost.seconds = seconds.count();
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "db/database.h"
@@ -34,6 +35,10 @@ Extraction extract(const Database& db, const UniformCut& cut);
 template <class Cut>  // ViewCut, CorridorCut, FieldCut; a template, so that braces mean a uniform cut
 requires requires(const Cut& cut) { make_surface(cut), cut.strict; }
 Extraction extract(const Database& db, const Cut& cut) { return extract(db, *make_surface(cut), cut.strict); }
+
+/// The finest patches of some grids alone, whether others hide them or not: with the priority blend the
+/// surface of these surveys, as if there were no other. Looks at every block of theirs.
+Extraction extract_grids(const Database& db, std::span<const GridId> grids, const Region& region = {});
 
 /// What a client that holds the patches of `before` must get and may drop, each by id.
 struct Difference {

@@ -75,7 +75,12 @@ Region Region::parse_polygon(const std::string& text) { return inside(parse_poin
 
 bool Region::contains(Point p) const {
   if (!bounds_.contains(p)) return false;
-  return corners_.empty() || bg::covered_by(Vertex(p.x, p.y), polygon_of(corners_));
+  bool inside = corners_.empty();
+  for (std::size_t k = 0; k < corners_.size(); ++k) {  // sides to the right of it: an odd number
+    const Point &a = corners_[k], &b = corners_[(k + 1) % corners_.size()];
+    if ((a.y > p.y) != (b.y > p.y)) inside ^= p.x < a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y));
+  }
+  return inside;
 }
 
 bool Region::meets(const Grid& grid, const GridShape::Block& b) const {

@@ -20,7 +20,7 @@ class Region {
   static Region parse_polygon(const std::string& text);
 
   const Extent& bounds() const { return bounds_; }
-  bool contains(Point p) const;
+  bool contains(Point p) const;  ///< either way on a polygon's rim
   /// Does the domain of a patch meet the region?
   bool meets(const Grid& grid, const GridShape::Block& block) const;
 

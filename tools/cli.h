@@ -36,6 +36,8 @@ void add_info(CLI::App& app, Common& common);
 void add_query(CLI::App& app, Common& common);
 void add_profile(CLI::App& app, Common& common);
 void add_sight(CLI::App& app, Common& common);
+void add_accuracy(CLI::App& app, Common& common);
+void add_volume(CLI::App& app, Common& common);
 void add_sample(CLI::App& app, Common& common);
 void add_resample(CLI::App& app, Common& common);
 void add_cost(CLI::App& app, Common& common);

@@ -50,6 +50,8 @@ int main(int argc, char** argv) {
   cli::add_sample(app, common);
   cli::add_profile(app, common);
   cli::add_sight(app, common);
+  cli::add_accuracy(app, common);
+  cli::add_volume(app, common);
   cli::add_resample(app, common);
   cli::add_cost(app, common);
   cli::add_render(app, common);

@@ -1,4 +1,4 @@
-// The questions of surveyors: sight and profile, as a person asks them.
+// The questions of surveyors: sight, profile, accuracy and volume, as a person asks them.
 #include <cmath>
 
 #include "tests/cli/command.h"
@@ -100,6 +100,55 @@ TEST_F(ProfileVerb, RefusesWhatIsNoLine) {
   EXPECT_SAYS(complaint(run({"profile", database_, "--line", "1 2", "--step", "1"})), "two points");
   EXPECT_SAYS(complaint(run({"profile", database_, "--line", "1 2, x"})), "cannot read");
   EXPECT_EQ(run({"profile", database_}).code, 2);
+}
+
+class Surveys : public Survey {
+ protected:
+  // A second survey of the plain's east, 3 m lower, twice as accurate.
+  Surveys() {
+    RasterFile f{.width = 41, .height = 61};
+    f.geotransform = {500600, 10, 0, 5000000, 0, -10};
+    f.at = [](int, int) { return 97.0; };
+    const std::string file = make(f, "later.tif");
+    EXPECT_EQ(run({"import", database_, file, "--accuracy", "0.05", "--quiet"}).code, 0);
+  }
+};
+
+using VolumeVerb = Surveys;
+
+TEST_F(VolumeVerb, MeasuresBetweenSurveys) {
+  const Json v = json({"volume", database_, "--json", "--before", "plain", "--after", "later", "--extent",
+                       "500700", "4999600", "500900", "4999800"});
+  EXPECT_NEAR(v["net"].get<double>(), -3 * 200 * 200, 1);
+  EXPECT_NEAR(v["cut"]["area"].get<double>(), 200 * 200, 1e-3);
+  EXPECT_EQ(v["fill"]["volume"], 0);
+  EXPECT_GT(v["error"].get<double>(), 0.149 * 200 * 200);
+  EXPECT_LT(v["error"].get<double>(), 0.16 * 200 * 200);
+  const Json plane = json({"volume", database_, "--json", "--plane", "90", "--polygon",
+                           "500700 4999600, 500900 4999600, 500900 4999800"});
+  EXPECT_NEAR(plane["net"].get<double>(), 7 * 20000, 7 * 2500) << "half a square, by pixels of 10 m";
+  const Outcome o = run({"volume", database_, "--before", "plain", "--after", "later"});
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_SAYS(o.out, "net ");
+  EXPECT_SAYS(complaint(run({"volume", database_, "--before", "nobody"})), "no grid of this name");
+  EXPECT_EQ(run({"volume", database_}).code, 2);
+}
+
+using AccuracyVerb = Surveys;
+
+TEST_F(AccuracyVerb, TellsTheBestWhereItIsAndWhoAnswers) {
+  const Json a =
+      json({"accuracy", database_, "--json", "--extent", "500100", "4999600", "500900", "4999800"});
+  EXPECT_NEAR(a["best"]["bound"].get<double>(), 0.05, 0.01);
+  EXPECT_GT(a["best"]["at"][0].get<double>(), 500600) << "in the east";
+  EXPECT_NEAR(a["worst"]["bound"].get<double>(), 0.1, 0.01);
+  EXPECT_NEAR(a["by_grid"]["plain"].get<double>() + a["by_grid"]["later"].get<double>(), 800 * 200, 1);
+  EXPECT_EQ(a["area_missing"], 0);
+  const std::string map = in_directory("bounds.tif");
+  const Outcome o = run({"accuracy", database_, "--map", map});
+  EXPECT_EQ(o.code, 0) << o.err;
+  EXPECT_SAYS(o.out, "smallest error available 0.05");
+  EXPECT_TRUE(std::filesystem::exists(map));
 }
 
 }  // namespace patchwork

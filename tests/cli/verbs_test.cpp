@@ -7,7 +7,8 @@ namespace patchwork {
 
 namespace {
 
-const Words kVerbs{"import", "list", "info", "query", "sample", "resample", "profile", "sight"};
+const Words kVerbs{"import",   "list",    "info",  "query",    "sample",
+                   "resample", "profile", "sight", "accuracy", "volume"};
 
 std::vector<std::string> missing_keys(const Json& document, const Words& keys) {
   std::vector<std::string> missing;

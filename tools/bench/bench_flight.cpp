@@ -22,6 +22,9 @@ constexpr double kFramesPerSecond = 60;
 constexpr int kAhead = 30;      // frames between a prediction and its use
 constexpr int kEachAgain = 25;  // every so many frames the whole view is sent, as a peer
 constexpr double kPixelError = 3;
+// What a prediction asks for beside the predicted view itself: a wider one, finer and coarser by a seventh,
+// because the camera will have turned, and be a little nearer or farther, than it seemed.
+constexpr double kFov = 50, kWider = 1.3, kFiner = 6. / 7, kCoarser = 7. / 6;
 
 // The state of a camera at a frame.
 struct Camera {
@@ -46,7 +49,7 @@ class Flight {
     Camera camera{0.5 * (extent_.xmin + extent_.xmax), extent_.ymin + 0.2 * (extent_.ymax - extent_.ymin), 0};
     Extraction before;
     std::vector<std::vector<PatchId>> predictions;
-    std::set<PatchId> fetched;
+    std::set<PatchId> fetched, shown;
     for (int frame = 0; frame < kFrames; ++frame) {
       const Camera next = moved(path, camera, frame);
       const Extraction now = seen(next);
@@ -58,9 +61,10 @@ class Flight {
       }
       if (frame % kEachAgain == 0) whole.push_back(double(encode_update(db_, {now.patches, {}}).size()));
       // From this frame and the last one to where the camera would be: at hand when that frame comes.
-      predictions.push_back(seen(predicted(camera, next)).patches);
+      predictions.push_back(foreseen_from(predicted(camera, next)));
       if (frame >= kAhead)
         for (const PatchId id : predictions[std::size_t(frame - kAhead)]) fetched.insert(id);
+      shown.insert(now.patches.begin(), now.patches.end());
       resident += now.patches.size(), before = now, camera = next;
     }
     Work w{fmt::format("flight, {}", path.name), "bytes a frame", true, Spread::of(bytes), {}, {}};
@@ -75,6 +79,8 @@ class Flight {
                 {"patches_added", added},
                 {"patches_resident_mean", double(resident) / kFrames},
                 {"share_predicted", added > 0 ? double(foreseen) / double(added) : 1},
+                {"fetched_ahead", fetched.size()},
+                {"used_of_these", used(fetched, shown)},
                 {"paper_bytes", "few kB"}};
     return w;
   }
@@ -90,10 +96,26 @@ class Flight {
     return {now.x + kAhead * (now.x - before.x), now.y + kAhead * (now.y - before.y),
             now.heading + kAhead * (now.heading - before.heading)};
   }
-  Extraction seen(const Camera& c) const {
-    ViewCut v{.eye = {c.x, c.y, top_ + 300}, .look = {}, .fov_degrees = 50, .pixel_error = kPixelError};
+  Extraction seen(const Camera& c, double fov = kFov, double pixel_error = kPixelError) const {
+    ViewCut v{.eye = {c.x, c.y, top_ + 300}, .look = {}, .fov_degrees = fov, .pixel_error = pixel_error};
     v.look = {c.x + 5000 * std::sin(c.heading), c.y + 5000 * std::cos(c.heading), v.eye.z - 1000};
     return extract(db_, over_terrain_of(db_, v));
+  }
+  std::vector<PatchId> foreseen_from(const Camera& c) const {
+    // A pixel of a wider view is larger: the same error in the plane is seen under fewer of them.
+    const double wide = kFov * kWider,
+                 zoom = std::tan(kFov * std::numbers::pi / 360) / std::tan(wide * std::numbers::pi / 360);
+    std::vector<PatchId> all = seen(c).patches;
+    for (const double times : {kFiner, kCoarser}) {
+      const Extraction x = seen(c, wide, kPixelError * zoom * times);
+      all.insert(all.end(), x.patches.begin(), x.patches.end());
+    }
+    return all;
+  }
+  static std::size_t used(const std::set<PatchId>& fetched, const std::set<PatchId>& shown) {
+    std::size_t n = 0;
+    for (const PatchId id : fetched) n += shown.contains(id);
+    return n;
   }
 
   const Database& db_;

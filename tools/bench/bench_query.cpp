@@ -1,10 +1,7 @@
 // Which boxes does a question meet: the LOD-space tree beside the indexes that one could use instead.
 #include <fmt/format.h>
-#include <sqlite3.h>
 
 #include <algorithm>
-#include <boost/geometry.hpp>
-#include <boost/geometry/index/rtree.hpp>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -13,149 +10,16 @@
 #include "db/error.h"
 #include "query/extract.h"
 #include "tools/bench/bench.h"
+#include "tools/bench/box_indexes.h"
 #include "tools/bench/process.h"
 
 namespace patchwork::cli {
 
 namespace {
 
-namespace bg = boost::geometry;
-namespace bgi = boost::geometry::index;
-using Corner = bg::model::point<double, 3, bg::cs::cartesian>;
-using Box = bg::model::box<Corner>;
-using Entry = std::pair<Box, std::uint32_t>;
-using Boxes = std::vector<LodEntry>;
-
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
-
-// A question: all boxes that a cut meets. `bounds` and the errors from `low` to `high` hold every one of
-// them.
-struct Question {
-  std::unique_ptr<CutSurface> cut;
-  Extent bounds;
-  double low, high;
-  std::function<bool(const LodBox&)> meets;  // what a peer must test behind its own search
-};
-
-using Ids = std::vector<std::uint64_t>;
-
-// Each answers a question by the ids of the boxes, put behind those that are there.
-class Index {
- public:
-  virtual ~Index() = default;
-  virtual void find(const Question& q, Ids& ids) const = 0;
-};
-
-class Ours : public Index {
- public:
-  explicit Ours(const Boxes& boxes) : tree_(LodTree::build(boxes)) {}
-  void find(const Question& q, Ids& ids) const override {
-    cost_ = tree_.visit([&](const LodPage& page, bool inside) { return q.cut->hits(page, inside); },
-                        [&](const LodEntry& e) { ids.push_back(e.id.value); });
-  }
-  const VisitCost& cost() const { return cost_; }
-
- private:
-  LodTree tree_;
-  mutable VisitCost cost_;
-};
-
-// All boxes in six arrays, compared in vectors.
-class Scan : public Index {
- public:
-  explicit Scan(const Boxes& boxes) {
-    for (std::size_t k = 0; k < boxes.size(); k += LodPage::kSlots) {
-      LodPage page(0);
-      for (std::size_t i = k; i < std::min(boxes.size(), k + LodPage::kSlots); ++i) page.append(boxes[i]);
-      pages_.push_back(page);
-    }
-  }
-  void find(const Question& q, Ids& ids) const override {
-    for (const LodPage& page : pages_)
-      for (std::uint64_t left = q.cut->hits(page, false).met; left; left &= left - 1)
-        ids.push_back(page.ref[std::countr_zero(left)]);
-  }
-
- private:
-  std::vector<LodPage> pages_;
-};
-
-double as_is(double e) { return std::min(e, 1e30); }
-double by_octave(double e) { return std::log2(std::min(e, 1e30) + 1e-3); }
-
-template <class Params, double (*kScale)(double)>
-class Boost : public Index {
- public:
-  Boost(const Boxes& boxes, bool one_by_one) : boxes_(boxes) {
-    std::vector<Entry> entries;
-    for (std::size_t k = 0; k < boxes.size(); ++k) {
-      const LodBox& b = boxes[k].box;
-      entries.emplace_back(
-          Box({b.xmin, b.ymin, kScale(double(b.bottom))}, {b.xmax, b.ymax, kScale(double(b.top))}),
-          std::uint32_t(k));
-    }
-    if (one_by_one)
-      for (const Entry& e : entries) tree_.insert(e);
-    else
-      tree_ = bgi::rtree<Entry, Params>(entries);
-  }
-  void find(const Question& q, Ids& ids) const override {
-    const Box box({q.bounds.xmin, q.bounds.ymin, kScale(q.low)},
-                  {q.bounds.xmax, q.bounds.ymax, kScale(q.high)});
-    for (auto e = tree_.qbegin(bgi::intersects(box)); e != tree_.qend(); ++e)
-      if (const LodEntry& b = boxes_[e->second]; q.meets(b.box)) ids.push_back(b.id.value);
-  }
-
- private:
-  const Boxes& boxes_;
-  bgi::rtree<Entry, Params> tree_;
-};
-
-// SQLite's R*Tree with a query callback: the cut is asked for every node.
-class Sqlite : public Index {
- public:
-  explicit Sqlite(const Boxes& boxes) {
-    sqlite3_open(":memory:", &db_);
-    exec("CREATE VIRTUAL TABLE t USING rtree(id, x0, x1, y0, y1, e0, e1); BEGIN");
-    sqlite3_stmt* s = nullptr;
-    sqlite3_prepare_v2(db_, "INSERT INTO t VALUES(?, ?, ?, ?, ?, ?, ?)", -1, &s, nullptr);
-    for (std::size_t k = 0; k < boxes.size(); ++k) {
-      const LodBox& b = boxes[k].box;
-      const double sides[] = {b.xmin, b.xmax, b.ymin, b.ymax, double(b.bottom), as_is(double(b.top))};
-      sqlite3_bind_int64(s, 1, std::int64_t(k));
-      for (int i = 0; i < 6; ++i) sqlite3_bind_double(s, 2 + i, sides[i]);
-      sqlite3_step(s), sqlite3_reset(s);
-    }
-    sqlite3_finalize(s);
-    exec("COMMIT");
-    sqlite3_rtree_query_callback(db_, "cut", &Sqlite::ask, this, nullptr);
-    sqlite3_prepare_v2(db_, "SELECT id FROM t WHERE id MATCH cut()", -1, &query_, nullptr);
-  }
-  ~Sqlite() override { sqlite3_finalize(query_), sqlite3_close(db_); }
-  void find(const Question& q, Ids& ids) const override {
-    asked_ = &q;
-    while (sqlite3_step(query_) == SQLITE_ROW) ids.push_back(std::uint64_t(sqlite3_column_int64(query_, 0)));
-    sqlite3_reset(query_);
-  }
-
- private:
-  void exec(const char* sql) {
-    if (sqlite3_exec(db_, sql, nullptr, nullptr, nullptr) != SQLITE_OK)
-      throw Error("SQLite", sqlite3_errmsg(db_), "its R*Tree module is needed");
-  }
-  static int ask(sqlite3_rtree_query_info* info) {
-    const sqlite3_rtree_dbl* c = info->aCoord;
-    const LodBox box{c[0], c[2], c[1], c[3], float(c[4]), c[5] >= 1e30 ? INFINITY : float(c[5])};
-    info->eWithin = static_cast<Sqlite*>(info->pContext)->asked_->meets(box) ? PARTLY_WITHIN : NOT_WITHIN;
-    info->rScore = info->rParentScore;
-    return SQLITE_OK;
-  }
-  sqlite3* db_ = nullptr;
-  sqlite3_stmt* query_ = nullptr;
-  mutable const Question* asked_ = nullptr;
-};
 
 class QueryBench {
  public:
@@ -178,13 +42,7 @@ class QueryBench {
 
   void run(std::vector<Work>& works) {
     const Ours ours(boxes_);
-    std::vector<std::pair<std::string, std::unique_ptr<Index>>> peers;
-    peers.emplace_back("linear scan", std::make_unique<Scan>(boxes_));
-    peers.emplace_back("Boost packed", std::make_unique<Boost<bgi::rstar<16>, as_is>>(boxes_, false));
-    peers.emplace_back("Boost packed by log error",
-                       std::make_unique<Boost<bgi::rstar<16>, by_octave>>(boxes_, false));
-    peers.emplace_back("Boost R*", std::make_unique<Boost<bgi::rstar<16>, as_is>>(boxes_, true));
-    peers.emplace_back("SQLite R*Tree", std::make_unique<Sqlite>(boxes_));
+    const auto peers = peers_over(boxes_);
     for (const char* kind : {"everything", "sparse", "region", "view"}) {
       const std::vector<Question> questions = make(kind);
       Work w{fmt::format("{}, {} boxes", kind, boxes_.size()), "queries/s", false, {}, {}, {}};
@@ -207,11 +65,13 @@ class QueryBench {
       for (std::size_t i = 0; i < peers.size(); ++i)
         w.peers.emplace_back(peers[i].first, Spread::of(rates[i + 1]));
       const double n = double(questions.size());
-      w.answer = {{"boxes", boxes_.size()},
-                  {"results_mean", double(results) / n},
-                  {"pages_mean", double(cost.nodes) / n},
-                  {"compared_per_result", double(cost.boxes) / double(std::max<std::size_t>(results, 1))},
-                  {"paper_queries_per_second", {{"uniform", {55, 800}}, {"view", 400}}}};
+      w.answer = {
+          {"boxes", boxes_.size()},
+          {"results_mean", double(results) / n},
+          {"pages_mean", double(cost.nodes) / n},
+          {"visited_per_result", double(results + cost.nodes) / double(std::max<std::size_t>(results, 1))},
+          {"compared_per_result", double(cost.boxes) / double(std::max<std::size_t>(results, 1))},
+          {"paper_queries_per_second", {{"uniform", {55, 800}}, {"view", 400}}}};
       works.push_back(std::move(w));
     }
   }

@@ -1,0 +1,30 @@
+#include <chrono>
+
+#include "db/invariant.h"
+#include "query/found.h"
+
+namespace patchwork {
+
+Extraction extract_grids(const Database& db, std::span<const GridId> grids, const Region& region) {
+  const auto start = std::chrono::steady_clock::now();
+  const Database::Reading reading = db.reading();
+  std::vector<FoundPatch> found;
+  for (const GridId id : grids) {
+    const Grid& grid = db.grid(id);
+    const GridShape& shape = grid.info.shape;
+    for (std::size_t k = 0; k < shape.blocks(); ++k) {
+      const GridShape::Block b = shape.block(k);
+      if (b.level != 0 || !region.meets(grid, b)) continue;
+      const PatchRecord& p = grid.patches[k];
+      if (p.exists())
+        found.push_back(
+            {p.bottom, area(shape.kernel(0, b.bx, b.by)), &grid, k, PatchId::make(id, 0, b.bx, b.by)});
+    }
+  }
+  Extraction result = in_order(found);
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  result.cost.seconds = seconds.count();
+  return result;
+}
+
+}  // namespace patchwork

@@ -94,6 +94,14 @@ PATCHWORK_VECTORIZED void keep_inside(const LodPage& page, Side side, std::uint8
     hit[s] = std::uint8_t(hit[s] & (side.nx * px[s] + side.ny * py[s] <= most));
 }
 
+// Of the hits those with all corners on the inner side.
+PATCHWORK_VECTORIZED void keep_whole(const LodPage& page, Side side, std::uint8_t* __restrict hit) {
+  const double* const px = side.nx > 0 ? page.xmax : page.xmin;
+  const double* const py = side.ny > 0 ? page.ymax : page.ymin;
+  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s)
+    hit[s] = std::uint8_t(hit[s] & (side.nx * px[s] + side.ny * py[s] <= side.most));
+}
+
 class ViewSurface : public CutSurface {
  public:
   explicit ViewSurface(const ViewCut& cut)
@@ -141,13 +149,19 @@ class ViewSurface : public CutSurface {
     return seen.i0 <= d.i1 && d.i0 <= seen.i1 && seen.j0 <= d.j1 && d.j0 <= seen.j1;
   }
 
-  LodHits hits(const LodPage& page, bool) const override {
+  LodHits hits(const LodPage& page, bool inside) const override {
     if (sides_.empty()) return {};
     std::uint8_t hit[LodPage::kSlots];
     near_enough(page, eye_, above_, slope_ * slope_, bounds_, hit);
-    if (page.mask_of_used(hit) == 0) return {};
+    LodHits hits{page.mask_of_used(hit)};
+    if (inside) hits.inside = hits.met;
+    if (inside || hits.met == 0) return hits;
     for (const Side& side : sides_) keep_inside(page, side, hit);
-    return {page.mask_of_used(hit)};
+    hits.met = page.mask_of_used(hit);
+    if (page.level == 0 || hits.met == 0) return hits;
+    for (const Side& side : sides_) keep_whole(page, side, hit);
+    hits.inside = page.mask_of_used(hit);
+    return hits;
   }
 
  private:

@@ -1,5 +1,6 @@
 // The corridor: a polyline that needs more accuracy than its surroundings.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -15,39 +16,79 @@ double distance(const Point& p, const Point& a, const Point& b) {
   return std::hypot(p.x - (a.x + t * dx), p.y - (a.y + t * dy));
 }
 
-// Distances over a rectangle lie within half its diagonal of that at its centre: a range that is a little too
-// wide, which a field may have.
+double turn(const Point& a, const Point& b, const Point& p) {
+  return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
+}
+
+bool cross(const Point& a, const Point& b, const Point& p, const Point& q) {
+  return (turn(a, b, p) > 0) != (turn(a, b, q) > 0) && (turn(p, q, a) > 0) != (turn(p, q, b) > 0);
+}
+
+using Corners = std::array<Point, 4>;  // of a rectangle, in turn
+
+bool holds(const Corners& r, const Point& p) {
+  int left = 0;
+  for (std::size_t k = 0; k < 4; ++k) left += turn(r[k], r[(k + 1) % 4], p) >= 0;
+  return left == 0 || left == 4;
+}
+
+struct Distances {
+  double least, most;  // metres
+};
+
+// From the segment to points of the rectangle: the largest is at a corner, because the distance from a convex
+// set is convex.
+Distances distances(const Corners& r, const Point& a, const Point& b) {
+  Distances d{holds(r, a) ? 0 : std::numeric_limits<double>::infinity(), 0};
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Point &p = r[k], &q = r[(k + 1) % 4];
+    const double corner = distance(p, a, b);
+    d.least = cross(a, b, p, q) ? 0 : std::min({d.least, corner, distance(a, p, q), distance(b, p, q)});
+    d.most = std::max(d.most, corner);
+  }
+  return d;
+}
+
+// What holds a rectangle has a range that holds the rectangle's: pages are passed by only where none of their
+// patches is meant. (Distances from a centre, give or take half a diagonal, do not have that property.)
 class CorridorSurface : public RangedSurface {
  public:
   explicit CorridorSurface(const CorridorCut& cut) : RangedSurface(cut.region), cut_(cut) {}
 
-  double at(Point p) const override { return tolerance(from_line(p)); }
-  ToleranceRange over(const Frame& frame, const LatticeRect& r) const override {
-    const Point a = frame.to_domain(r.i0, r.j0), b = frame.to_domain(r.i1, r.j1);
-    return around({0.5 * (a.x + b.x), 0.5 * (a.y + b.y)}, 0.5 * std::hypot(b.x - a.x, b.y - a.y));
+  double at(Point p) const override {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k + 1 < cut_.line.size(); ++k)
+      nearest = std::min(nearest, distance(p, cut_.line[k], cut_.line[k + 1]));
+    return tolerance(nearest);
+  }
+  ToleranceRange over(const Frame& f, const LatticeRect& r) const override {
+    return over(
+        {f.to_domain(r.i0, r.j0), f.to_domain(r.i1, r.j0), f.to_domain(r.i1, r.j1), f.to_domain(r.i0, r.j1)},
+        kHair);
   }
 
  protected:
   ToleranceRange within(const Extent& e) const override {
-    return around({0.5 * (e.xmin + e.xmax), 0.5 * (e.ymin + e.ymax)},
-                  0.5 * std::hypot(e.xmax - e.xmin, e.ymax - e.ymin));
+    return over({Point{e.xmin, e.ymin}, {e.xmax, e.ymin}, {e.xmax, e.ymax}, {e.xmin, e.ymax}}, 2 * kHair);
   }
 
  private:
-  double from_line(const Point& p) const {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k + 1 < cut_.line.size(); ++k)
-      nearest = std::min(nearest, distance(p, cut_.line[k], cut_.line[k + 1]));
-    return nearest;
-  }
+  static constexpr double kHair = 1e-9;  // of the distances, for their rounding
+
   double tolerance(double d) const {
     const double t =
         cut_.ramp > 0 ? std::clamp((d - cut_.width) / cut_.ramp, 0.0, 1.0) : double(d > cut_.width);
     return cut_.error + t * (cut_.outside - cut_.error);
   }
-  ToleranceRange around(const Point& centre, double radius) const {
-    const double d = from_line(centre), slack = 1e-9 * (d + radius);
-    const double a = tolerance(d - radius - slack), b = tolerance(d + radius + slack);
+  ToleranceRange over(const Corners& r, double hair) const {
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    Distances all{kFar, kFar};
+    for (std::size_t k = 0; k + 1 < cut_.line.size(); ++k) {
+      const Distances d = distances(r, cut_.line[k], cut_.line[k + 1]);
+      all = {std::min(all.least, d.least), std::min(all.most, d.most)};
+    }
+    const double slack = hair * (all.most + std::hypot(r[2].x - r[0].x, r[2].y - r[0].y));
+    const double a = tolerance(all.least - slack), b = tolerance(all.most + slack);
     return {std::min(a, b), std::max(a, b)};
   }
   CorridorCut cut_;

@@ -16,20 +16,20 @@ namespace effects {
 struct ErrorOverlay {
   std::optional<double> lowest, highest;  ///< metres; without: of what is in view
   bool logarithmic = false;               ///< else where the bounds' skewness is above 1
-  double opacity = 0.8;
+  double opacity = 1;
 };
 void describe(Fields<ErrorOverlay>& fields);
 
 /// Which grid answers.
 struct SourceOverlay {
-  double opacity = 0.6;
+  double opacity = 0.85;
 };
 void describe(Fields<SourceOverlay>& fields);
 
 /// How many patches each tile was made of.
 struct CostOverlay {
   double highest = 20;  ///< patches at the end of the ramp
-  double opacity = 0.8;
+  double opacity = 1;
 };
 void describe(Fields<CostOverlay>& fields);
 

@@ -36,6 +36,7 @@ struct Work {
 /// Each measures ours and the peers in turns, A B A B. Throws Error where a peer's program is missing.
 std::vector<Work> bench_blend(const BenchOptions& options);
 std::vector<Work> bench_codec(const BenchOptions& options);
+std::vector<Work> bench_effects(const BenchOptions& options);
 std::vector<Work> bench_flight(const BenchOptions& options);
 std::vector<Work> bench_import(const BenchOptions& options);
 std::vector<Work> bench_query(const BenchOptions& options);

@@ -10,10 +10,10 @@ namespace patchwork::cli {
 namespace {
 
 const std::map<std::string, std::vector<Work> (*)(const BenchOptions&)> kBenches{
-    {"blend", &bench_blend},   {"codec", &bench_codec},       {"flight", &bench_flight},
-    {"import", &bench_import}, {"query", &bench_query},       {"readers", &bench_readers},
-    {"render", &bench_render}, {"resample", &bench_resample}, {"tiles", &bench_tiles},
-    {"update", &bench_update}};
+    {"blend", &bench_blend},     {"codec", &bench_codec},   {"effects", &bench_effects},
+    {"flight", &bench_flight},   {"import", &bench_import}, {"query", &bench_query},
+    {"readers", &bench_readers}, {"render", &bench_render}, {"resample", &bench_resample},
+    {"tiles", &bench_tiles},     {"update", &bench_update}};
 
 struct Options {
   std::string name;

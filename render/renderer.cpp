@@ -190,7 +190,7 @@ FrameStats Renderer::Impl::draw(const Camera& from) {
   if (!drawn || other_look || stats.tiles_made > 0 || now != block || draws != last_draws) {
     terrain.set(now, draws);
     stats.bytes_up += terrain.bytes_set() + effects.bytes_set();
-    block = now, last_draws = draws, drawn = true;
+    block = now, last_draws = draws, drawn = stats.redrawn = true;
     submit(stats);
   }
   stats.total_ms = ms_since(start);
@@ -209,9 +209,11 @@ Image Renderer::picture() const {
   const std::uint32_t* from = impl_->target.pixels();
   for (std::size_t k = 0; k < image.pixels.size(); ++k)
     image.pixels[k] = {std::uint8_t(from[k]), std::uint8_t(from[k] >> 8), std::uint8_t(from[k] >> 16)};
-  impl_->effects.draw_legend(image);
+  draw_legend(image);
   return image;
 }
+
+void Renderer::draw_legend(Image& picture) const { impl_->effects.draw_legend(picture); }
 
 void Renderer::change(const SceneEffects& to) {
   if (knowing(to) && !impl_->store.knowledge)
@@ -252,7 +254,25 @@ bool Renderer::refresh(Database& db) {
 }
 
 Renderer::Drawn Renderer::drawn() const { return {impl_->store, impl_->block, impl_->draws}; }
+
+void Renderer::reshape(int width, int height, double pixel_error) {
+  RendererOptions& o = impl_->options;
+  o.pixel_error = pixel_error;
+  impl_->supply.set_pixel_error(pixel_error);
+  if (o.width == width && o.height == height) return;
+  o.width = width, o.height = height, impl_->drawn = false;
+  impl_->effects.change(scene_of(o));
+  impl_->target.resize(impl_->card, std::uint32_t(width), std::uint32_t(height));
+}
+
 const TileCache& Renderer::cache() const { return impl_->supply.cache(); }
 const TileLattice& Renderer::lattice() const { return impl_->lattice; }
+std::vector<TileKey> Renderer::tiles() const {
+  std::vector<TileKey> keys;
+  for (const std::uint32_t k : impl_->supply.selection().drawn)
+    keys.push_back(impl_->supply.selection().leaves[k].key);
+  return keys;
+}
+const vk::Target& Renderer::target() const { return impl_->target; }
 
 }  // namespace patchwork

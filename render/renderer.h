@@ -19,6 +19,7 @@ namespace patchwork {
 struct TileDraw;
 namespace vk {
 struct FrameBlock;
+class Target;
 struct TileStore;
 }  // namespace vk
 
@@ -53,6 +54,7 @@ struct FrameStats {
   std::uint64_t triangles = 0;            ///< 0 where the device does not count
   double pixels_asked = 0, pixels_reached = 0;
   double bound_max = 0;                                   ///< metres: of all heights drawn
+  bool redrawn = false;                                   ///< else the picture is that of the frame before
   BlendCounts blended;                                    ///< of the tiles made
   std::size_t shadow_dispatches = 0, sky_dispatches = 0;  ///< of the light map
 };
@@ -67,8 +69,8 @@ class Renderer {
   ~Renderer();
 
   /// Waits until all that the picture needs is there, unless it is realtime. A frame whose input
-  /// is that of the one before is not drawn again: FrameStats::draws is 0. Throws Error: the device's memory,
-  /// damaged payloads.
+  /// is that of the one before is not drawn again: see FrameStats::redrawn. Throws Error: the device's
+  /// memory, damaged payloads.
   FrameStats draw(const Camera& camera);
   /// Other effects from the next picture on, of the same kinds of overlay; what stays valid is kept. Throws
   /// Error: an overlay of bounds or sources that the renderer was not made with.
@@ -88,8 +90,14 @@ class Renderer {
     std::span<const TileDraw> draws;
   };
   Drawn drawn() const;
+  /// From the next frame on: another size of the picture (pixels, at least 1 x 1), another error. Tiles stay.
+  void reshape(int width, int height, double pixel_error);
+  /// Onto a picture of any size: what picture() has of a legend.
+  void draw_legend(Image& picture) const;
   const TileCache& cache() const;
   const TileLattice& lattice() const;
+  std::vector<TileKey> tiles() const;  ///< the last frame's tiles
+  const vk::Target& target() const;    ///< what was drawn last, ready to be copied from: vulkan/target_impl.h
 
  private:
   struct Impl;

@@ -112,11 +112,8 @@ std::string reason(const std::exception& e) {
 
 }  // namespace
 
-Scene default_scene() {
-  Scene s;
-  s.effects.sun.emplace(), s.effects.tints.emplace();
-  return s;
-}
+std::string default_scene_text() { return R"({"effects": {"sun": {}, "tints": {}}})"; }
+Scene default_scene() { return parse_scene(default_scene_text(), "the default scene"); }
 
 Scene parse_scene(const std::string& json, const std::string& where) {
   const JsonPlace at{where, ""};

@@ -74,6 +74,7 @@ struct Scene {
 
 /// What is shown where no scene is named: all of the terrain, in sunlight, coloured by height.
 Scene default_scene();
+std::string default_scene_text();  ///< the same as JSON
 
 /// Throws Error(where, "PLACE: what is wrong", advice), PLACE as in "effects.sun.elevation": no JSON, a
 /// member that is unknown, missing, of the wrong type or out of its range, effects that need or exclude each

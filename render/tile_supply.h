@@ -19,7 +19,9 @@ class TileSupply {
   /// What to draw. Without RendererOptions::realtime all that it needs has been made; else what was fetched
   /// and fits into make_ms, while missing tiles are drawn by their ancestors.
   const Selection& update(const Frustum& frustum, FrameStats& stats);
+  void set_pixel_error(double pixels) { options_.pixel_error = pixels; }
   const TileCache& cache() const { return cache_; }
+  const Selection& selection() const { return selection_; }  ///< of the last update
   std::uint32_t most_tiles() const { return most_tiles_; }
 
   /// True if no worker reads any more: the database may move on until release(). Else ask again a frame

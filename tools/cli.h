@@ -43,6 +43,7 @@ void add_resample(CLI::App& app, Common& common);
 void add_cost(CLI::App& app, Common& common);
 void add_render(CLI::App& app, Common& common);
 void add_selftest(CLI::App& app, Common& common);
+void add_view(CLI::App& app, Common& common);
 void add_bench(CLI::App& app, Common& common);
 
 /// A subcommand with the common options.

@@ -56,6 +56,7 @@ int main(int argc, char** argv) {
   cli::add_cost(app, common);
   cli::add_render(app, common);
   cli::add_selftest(app, common);
+  cli::add_view(app, common);
   cli::add_bench(app, common);
 
   for (CLI::App* v : app.get_subcommands({}))

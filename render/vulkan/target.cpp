@@ -49,16 +49,23 @@ OwnedRenderPass make_pass(const Device::Impl& device) {
 }  // namespace
 
 Target::Target(const Device::Impl& device, std::uint32_t width, std::uint32_t height)
-    : color_(device, {.format = kColor,
-                      .width = width,
-                      .height = height,
-                      .usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT}),
-      depth_(device, {.format = kDepth,
-                      .width = width,
-                      .height = height,
-                      .usage = VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT,
-                      .aspect = VK_IMAGE_ASPECT_DEPTH_BIT}),
-      pass_(make_pass(device)) {
+    : pass_(make_pass(device)) {
+  resize(device, width, height);
+}
+
+// What is old goes first: its memory may be what the new one takes.
+void Target::resize(const Device::Impl& device, std::uint32_t width, std::uint32_t height) {
+  framebuffer_ = {}, color_ = {}, depth_ = {}, color_out_ = {}, depth_out_ = {};
+  color_ = Texture(device, {.format = kColor,
+                            .width = width,
+                            .height = height,
+                            .usage = VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT});
+  depth_ =
+      Texture(device, {.format = kDepth,
+                       .width = width,
+                       .height = height,
+                       .usage = VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT,
+                       .aspect = VK_IMAGE_ASPECT_DEPTH_BIT});
   const VkImageView views[] = {color_.view(), depth_.view()};
   VkFramebufferCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO, info.renderPass = pass_.get();

@@ -13,6 +13,9 @@ class Target {
   static constexpr VkFormat kColor = VK_FORMAT_R8G8B8A8_UNORM, kDepth = VK_FORMAT_D32_SFLOAT;
   Target(const Device::Impl& device, std::uint32_t width, std::uint32_t height);
 
+  /// The pass stays, and with it what was made for it. REQUIRES: nothing that uses the images is running.
+  void resize(const Device::Impl& device, std::uint32_t width, std::uint32_t height);
+
   VkRenderPass pass() const { return pass_.get(); }
   VkExtent2D size() const { return {color_.shape().width, color_.shape().height}; }
   const Texture& color() const { return color_; }

@@ -7,8 +7,8 @@ namespace patchwork {
 
 namespace {
 
-const Words kVerbs{"import",   "list",    "info",  "query",    "sample",
-                   "resample", "profile", "sight", "accuracy", "volume"};
+const Words kVerbs{"import",  "list",  "info",     "query",  "sample", "resample",
+                   "profile", "sight", "accuracy", "volume", "view"};
 
 std::vector<std::string> missing_keys(const Json& document, const Words& keys) {
   std::vector<std::string> missing;

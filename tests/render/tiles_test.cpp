@@ -9,6 +9,7 @@
 #include "render/tile_cut.h"
 #include "render/tile_seams.h"
 #include "tests/blend/scene.h"
+#include "tests/hard_case.h"
 
 namespace patchwork {
 namespace {
@@ -248,6 +249,7 @@ TEST(EdgeSplit, WhoeverSharesAVertexReadsTheSameTexel) {
   }
   EXPECT_GT(shared, 10000);
   EXPECT_GT(finer, 1000) << "levels meet";
+  report_law("EdgeSplit", "whoever shares a vertex reads the same texel", std::uint64_t(shared));
 }
 
 // edges.comp in C++: the segments of each border edge, in the terms of its tile, from what blocks need.
@@ -304,6 +306,7 @@ TEST(EdgeSplit, EverySharedEdgeIsSplitAtTheSamePlaces) {
     edges += segments.size();
   }
   EXPECT_GT(edges, 10000u);
+  report_law("EdgeSplit", "both sides split a shared edge at the same places", edges);
 }
 
 }  // namespace

@@ -58,9 +58,10 @@ class Path {
   double side_ = 0, top_ = 0;
 };
 
-const std::pair<TilePolicy, const char*> kPolicies[] = {{TilePolicy::lru, "least recently used"},
-                                                        {TilePolicy::first, "first available"},
-                                                        {TilePolicy::lru_error, "smallest error"}};
+// The default first.
+const std::pair<TilePolicy, const char*> kPolicies[] = {{TilePolicy::lru_error, "smallest error"},
+                                                        {TilePolicy::lru, "least recently used"},
+                                                        {TilePolicy::first, "first available"}};
 
 // One way along the path with a pool that holds little more than a view.
 Work policies(const std::shared_ptr<Device>& device, const Database& db, const std::string& kind) {

@@ -135,12 +135,13 @@ void Database::Impl::load() {
     PatchRecords records = stored_records(info);
     grids.push_back({std::move(info), std::move(records)});
   }
-  const auto is_there = [&](const Grid& old) {
-    return std::any_of(grids.begin(), grids.end(), [&](const Grid& g) {
-      return g.info.id == old.info.id && g.info.digest == old.info.digest;
-    });
-  };
-  if (!std::all_of(before.begin(), before.end(), is_there)) chunks.clear(), surfaces.clear();
+  std::set<GridId> gone;  // their ids are given to other grids again
+  for (const Grid& old : before)
+    if (std::none_of(grids.begin(), grids.end(), [&](const Grid& g) {
+          return g.info.id == old.info.id && g.info.digest == old.info.digest;
+        }))
+      gone.insert(old.info.id);
+  forget_heights(gone);
   tree = LodTree(), tree_damage.reset();
   try {
     const auto header = store->blob(Store::Kind::tree_page, 0);
@@ -154,6 +155,12 @@ void Database::Impl::load() {
   } catch (const Error& e) {
     tree_damage = e;
   }
+}
+
+void Database::Impl::forget_heights(const std::set<GridId>& gone) {
+  if (gone.empty()) return;
+  const auto of_gone = [&](std::uint64_t key) { return gone.contains(PatchId{key}.grid()); };
+  chunks.erase_if(of_gone), surfaces.erase_if(of_gone);
 }
 
 void Database::Impl::change(const std::function<bool()>& work) {
@@ -258,6 +265,15 @@ bool Database::refresh() {
   if (std::stoull(store.fact("version").value_or("0")) == before) return false;
   impl_->load();
   return true;
+}
+
+bool Database::is_newest() const {
+  std::unique_ptr<Store>& watch = impl_->watch;
+  if (!watch) watch = open_store(path(), StoreMode::read);
+  watch->begin_read();
+  const std::uint64_t newest = std::stoull(watch->fact("version").value_or("0"));
+  watch->rollback();
+  return newest == version();
 }
 
 Database::Reading Database::reading() const {

@@ -76,6 +76,8 @@ class Database {
 
   /// Moves to the newest state; false if this is it. Cached heights stay where their grids do.
   bool refresh();
+  /// False if refresh() would move it. Safe beside threads that read; one thread at a time may ask.
+  bool is_newest() const;
   /// Counts committed changes; the same for every reader of the same state.
   std::uint64_t version() const;
   /// What came and went after `version`, up to this state, oldest first: where a client must look again.

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <mutex>
+#include <set>
 #include <shared_mutex>
 
 #include "db/database.h"
@@ -17,8 +18,9 @@ struct Database::Impl {
   Impl(std::unique_ptr<Store> opened, std::size_t memory);
 
   /// Takes grids and tree as the store's current transaction has them; records and pages are read when asked
-  /// for. Cached heights stay unless a grid is gone.
+  /// for. Cached heights stay where their grids do.
   void load();
+  void forget_heights(const std::set<GridId>& gone);
   /// Runs `work` in a write transaction that it ends with commit(), true, or rollback(), false; afterwards,
   /// whatever happens, this is a state of the store.
   void change(const std::function<bool()>& work);
@@ -32,6 +34,7 @@ struct Database::Impl {
   std::size_t place(const std::string& name) const;  ///< throws Error: there is none
 
   std::unique_ptr<Store> store;
+  std::unique_ptr<Store> watch;  // another connection, that sees what comes; made when first asked for
   std::mutex store_mutex;       // the store is one connection; blobs are read from many threads
   std::shared_mutex structure;  // shared by those who hold references into records or pages
   std::size_t structure_share;  // bytes

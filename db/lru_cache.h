@@ -34,9 +34,18 @@ class LruCache {
     return made;
   }
 
-  void clear() {
+  /// Lets go of the values whose keys are `gone(key)`.
+  template <class Gone>
+  void erase_if(Gone gone) {
     const std::lock_guard lock(mutex_);
-    places_.clear(), items_.clear(), used_ = 0;
+    for (auto it = items_.begin(); it != items_.end();) {
+      if (!gone(it->key)) {
+        ++it;
+        continue;
+      }
+      used_ -= it->cost, places_.erase(it->key);
+      it = items_.erase(it);
+    }
   }
 
  private:

@@ -106,7 +106,7 @@ void Restate::remove(std::size_t place) {
   db_.store->remove_grid(gone.info.id);
   for (const Store::Kind kind : {Store::Kind::records, Store::Kind::payload})
     db_.store->erase_blobs(kind, first_key(gone.info.id), end_key(gone.info.id));
-  db_.chunks.clear(), db_.surfaces.clear();  // the next grid may get its id
+  db_.forget_heights({gone.info.id});  // the next grid may get its id
   evaluate(std::move(places), kNone);
   change_tree();
 }

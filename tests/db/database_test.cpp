@@ -226,6 +226,35 @@ TEST(Database, AReaderKeepsItsStateWhileAnotherWrites) {
   EXPECT_NE(Database::open(writer.path()).content_hash(), before);
 }
 
+TEST(Database, IsNewestUntilAnotherCommits) {
+  const GridFolder folder;
+  Database writer = two_grids(folder);
+  Database reader = Database::open(writer.path());
+  EXPECT_TRUE(reader.is_newest());
+  folder.add(writer, heights("1 2 / 3 4", {.accuracy = 0.01}), "later");
+  const std::string old = reader.content_hash();
+  EXPECT_FALSE(reader.is_newest());
+  EXPECT_EQ(reader.content_hash(), old) << "asking moves nothing";
+  EXPECT_TRUE(reader.refresh());
+  EXPECT_TRUE(reader.is_newest());
+  EXPECT_TRUE(writer.is_newest());
+}
+
+TEST(Database, HeightsStayInMemoryWhereTheirGridDoes) {
+  const GridFolder folder;
+  Database writer = two_grids(folder);
+  folder.add(writer, heights("1 2 / 3 4", {.accuracy = 0.01}), "later");
+  Database reader = Database::open(writer.path());
+  const PatchId stays = grid_named(reader, "later").patch_id(0), goes = grid_named(reader, "fine").patch_id(0);
+  const auto kept = reader.surface(stays), gone = reader.surface(goes);
+  writer.remove("fine");
+  const ImportReport another = folder.add(writer, heights("5 6 / 7 8", {.accuracy = 0.02}), "another");
+  ASSERT_TRUE(reader.refresh());
+  EXPECT_EQ(reader.surface(stays), kept) << "not read again";
+  const PatchId same_name = grid_named(reader, "another").patch_id(0);
+  EXPECT_NE(reader.surface(same_name), gone) << "even if it has the id of the grid that went";
+}
+
 TEST(Database, RefreshMovesToTheNewestStateAndSaysWhatChanged) {
   const GridFolder folder;
   Database writer = two_grids(folder);

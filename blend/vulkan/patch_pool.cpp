@@ -110,26 +110,46 @@ std::size_t PatchPool::bytes_of(const Resident& r) {
 }
 
 void PatchPool::hold(std::span<const PatchId> patches) {
-  drop_others(patches);
-  for (const PatchId id : patches)
-    if (!residents_.contains(id)) add(id);
+  ++holds_, unused_known_ = false;
+  std::vector<PatchId> missing;
+  for (const PatchId id : patches) {
+    const auto at = residents_.find(id);
+    if (at == residents_.end())
+      missing.push_back(id);
+    else
+      at->second.held = holds_;
+  }
+  for (const PatchId id : missing) add(id);
   impl_->ring.flush();
 }
 
-// Slots of what goes are free at once: uploads into them are queued behind whatever still reads them.
-void PatchPool::drop_others(std::span<const PatchId> patches) {
-  std::vector<PatchId> kept(patches.begin(), patches.end());
-  std::sort(kept.begin(), kept.end());
+void PatchPool::drop(const std::function<bool(GridId)>& gone) {
   std::erase_if(residents_, [&](const auto& resident) {
-    if (std::binary_search(kept.begin(), kept.end(), resident.first)) return false;
-    free_.push_back(resident.second.slot);
-    if (resident.second.holes) free_.push_back(*resident.second.holes);
-    ++traffic_.dropped;
+    if (!gone(resident.first.grid())) return false;
+    release(resident.second);
     return true;
   });
 }
 
-void PatchPool::require(std::size_t slots) const {
+// Slots of what goes are free at once: uploads into them are queued behind whatever still reads them.
+void PatchPool::release(const Resident& r) {
+  free_.push_back(r.slot);
+  if (r.holes) free_.push_back(*r.holes);
+  ++traffic_.dropped;
+}
+
+void PatchPool::require(std::size_t slots) {
+  if (free_.size() < slots && !unused_known_) {
+    unused_.clear(), unused_known_ = true;
+    for (const auto& [id, r] : residents_)
+      if (r.held != holds_) unused_.push_back(id);
+    std::sort(unused_.begin(), unused_.end(),
+              [&](PatchId a, PatchId b) { return residents_.at(a).held > residents_.at(b).held; });
+  }
+  for (; free_.size() < slots && !unused_.empty(); unused_.pop_back()) {
+    const auto at = residents_.find(unused_.back());
+    release(at->second), residents_.erase(at);
+  }
   if (free_.size() < slots)
     throw Error(impl_->device->name(), "the patches do not fit into its pool of " + std::to_string(slots_),
                 "ask for a smaller extent or a larger error, or give it more memory");
@@ -149,7 +169,8 @@ void PatchPool::add(PatchId id) {
   const float origin = surface->codes[kSamples / 2];
   Resident r{.slot = take_slot(),
              .origin = origin,
-             .height = placed.quantum * (placed.origin + double(origin)) + placed.base};
+             .height = placed.quantum * (placed.origin + double(origin)) + placed.base,
+             .held = holds_};
   const auto send = [&](const vk::Buffer& to, std::uint32_t slot, const auto& items) {
     const auto bytes = std::as_bytes(std::span(items));
     impl_->ring.write(to, VkDeviceSize{slot} * bytes.size(), bytes);

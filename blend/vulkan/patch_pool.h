@@ -1,8 +1,9 @@
-// Patches resident on the card: what a cut keeps stays where it is, what it adds is sent once.
+// Patches resident on the card: what a cut needs is sent once and stays where it is while there is room.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -27,6 +28,7 @@ class PatchPool {
     double steepest = 0;                      ///< metres: the largest difference between neighbouring samples
     float origin = 0;                         ///< a code of its middle: the shader's codes are relative to it
     double height = 0;                        ///< of that code, metres
+    std::uint64_t held = 0;                   ///< the last call of hold() that named it
   };
   /// Since the pool was made.
   struct Traffic {
@@ -39,10 +41,12 @@ class PatchPool {
   PatchPool(std::shared_ptr<Device> device, const Database& db, std::size_t slots);
   ~PatchPool();
 
-  /// Drops what is not among `patches` and sends what is not there. Throws Error: they do not fit (those that
-  /// did are resident), damaged payloads. CAVEAT: ids name patches of one state of the database; hold({})
-  /// after it moved to another one.
+  /// Sends those of `patches` that are not there; where room is lacking, others go, the longest unused first.
+  /// Throws Error: they do not fit (those that did are resident), damaged payloads. CAVEAT: ids name patches
+  /// of one state of the database; drop() what is gone after it moved to another one.
   void hold(std::span<const PatchId> patches);
+  /// Patches of these grids are resident no more.
+  void drop(const std::function<bool(GridId)>& gone);
 
   const Resident& at(PatchId id) const { return residents_.at(id); }
   const std::map<PatchId, Resident>& residents() const { return residents_; }
@@ -58,8 +62,8 @@ class PatchPool {
 
  private:
   void add(PatchId id);
-  void drop_others(std::span<const PatchId> patches);
-  void require(std::size_t slots) const;
+  void release(const Resident& resident);
+  void require(std::size_t slots);
   std::uint32_t take_slot();
 
   const Database& db_;
@@ -67,6 +71,9 @@ class PatchPool {
   std::unique_ptr<Impl> impl_;
   std::map<PatchId, Resident> residents_;
   std::vector<std::uint32_t> free_;
+  std::vector<PatchId> unused_;  // by the running hold(), the longest last; listed when room is lacking
+  bool unused_known_ = false;
+  std::uint64_t holds_ = 0;
   Traffic traffic_;
 };
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "blend/vulkan/vulkan_blend_impl.h"
 
@@ -53,8 +54,9 @@ struct Pending {
 // Shaders name a grid by its id, which outlives its place among the others. The base lies in the middle of
 // all heights, where float32 has 0.25 mm at worst.
 void VulkanBlend::Impl::remember_grids() {
-  places.assign(1, 0);
+  places.assign(1, 0), grids.clear();
   for (const Grid& g : db.grids()) {
+    grids[g.info.id] = g.info.digest;
     const std::size_t id = g.info.id.value + 1;
     if (places.size() <= id) places.resize(id + 1, 0);
     places[id] = std::int32_t(&g - db.grids().data()) + 1;
@@ -232,8 +234,14 @@ VulkanBlend::VulkanBlend(std::shared_ptr<Device> device, const Database& db, std
 VulkanBlend::~VulkanBlend() = default;
 
 void VulkanBlend::change(std::span<const PatchId> patches) { impl_->hold(patches); }
+// Ids are given to other grids again; patches of the same grid have the same samples, rectangles and errors.
 void VulkanBlend::restart() {
+  const std::map<GridId, Digest> before = std::exchange(impl_->grids, {});
   impl_->remember_grids();
+  impl_->pool->drop([&](GridId id) {
+    const auto now = impl_->grids.find(id);
+    return now == impl_->grids.end() || now->second != before.at(id);
+  });
   impl_->hold({});
 }
 const Device& VulkanBlend::device() const { return *impl_->device; }

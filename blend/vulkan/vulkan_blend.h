@@ -59,9 +59,10 @@ class VulkanBlend : public Evaluator {
               const BlendOptions& options, const VulkanOptions& more = {});
   ~VulkanBlend() override;
 
-  /// The next cut: what both have in common is not sent again.
+  /// The next cut: what is resident still is not sent again.
   void change(std::span<const PatchId> patches);
-  /// The database moved to another state: nothing is resident any more. Cheaper than another object.
+  /// The database moved to another state: until change() there is no cut. Patches of grids that are in it
+  /// still stay resident.
   void restart();
 
   /// As Blend's. REQUIRES: out.patch is empty.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdlib>
+#include <map>
 
 #include "blend/vulkan/frame_impl.h"
 #include "blend/vulkan/vulkan_blend.h"
@@ -21,6 +22,7 @@ struct VulkanBlend::Impl {
   std::shared_ptr<vk::Passes> passes;
   std::unique_ptr<vk::Frame> frames[2];
   std::vector<std::int32_t> places;   // of a grid's id + 1: 1 + its place in Database::grids()
+  std::map<GridId, Digest> grids;     // of the state that resident patches come from
   std::vector<std::int32_t> sources;  // of the submission that is being taken
   double base = 0;                    // metres: heights on the card are relative to it
   BlockShares shares;

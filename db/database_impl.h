@@ -35,9 +35,9 @@ struct Database::Impl {
 
   std::unique_ptr<Store> store;
   std::unique_ptr<Store> watch;  // another connection, that sees what comes; made when first asked for
-  std::mutex store_mutex;       // the store is one connection; blobs are read from many threads
-  std::shared_mutex structure;  // shared by those who hold references into records or pages
-  std::size_t structure_share;  // bytes
+  std::mutex store_mutex;        // the store is one connection; blobs are read from many threads
+  std::shared_mutex structure;   // shared by those who hold references into records or pages
+  std::size_t structure_share;   // bytes
   std::atomic<std::size_t> runs_read{0};
   std::string crs;
   std::uint64_t version = 0;

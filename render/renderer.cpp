@@ -71,6 +71,7 @@ struct Renderer::Impl {
   vk::FrameBlock block{};
   Camera camera;
   bool drawn = false;
+  bool holding = false;  // the workers, until none of them reads
 
   Impl(std::shared_ptr<Device> d, const Database& database, const RendererOptions& o)
       : device(std::move(d)),
@@ -172,7 +173,7 @@ struct Renderer::Impl {
 FrameStats Renderer::Impl::draw(const Camera& from) {
   const auto start = Clock::now();
   FrameStats stats;
-  stats.pixels_asked = options.pixel_error;
+  stats.pixels_asked = options.pixel_error, stats.workers_held = holding;
   camera = from, camera.width = options.width, camera.height = options.height;
   const effects::SceneView view = scene_view();
   const double curvature = effects.curvature(view);
@@ -238,7 +239,9 @@ std::vector<float> Renderer::depth() const {
 }
 
 bool Renderer::refresh(Database& db) {
-  if (!impl_->supply.hold()) return false;
+  if (!impl_->holding && db.is_newest()) return false;
+  impl_->holding = !impl_->supply.hold();
+  if (impl_->holding) return false;
   const std::uint64_t before = db.version();
   const bool moved = db.refresh();
   std::vector<Extent> changed;

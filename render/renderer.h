@@ -49,6 +49,8 @@ struct FrameStats {
   double total_ms = 0;
   std::size_t tiles_drawn = 0, tiles_made = 0, tiles_wanted = 0;  ///< wanted: still missing
   std::size_t tiles_coarse = 0;  ///< drawn above the asked error, because finer ones are not there yet
+  std::size_t tiles_stale = 0;   ///< drawn as the database was, because they are not made anew yet
+  bool workers_held = false;     ///< the database is about to move
   std::size_t patches_sent = 0, bytes_up = 0;
   std::size_t dispatches = 0, draws = 0;  ///< the blend's own not counted; draws of the indirect calls
   std::uint64_t triangles = 0;            ///< 0 where the device does not count

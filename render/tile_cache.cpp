@@ -61,11 +61,14 @@ void TileCache::put(const TileKey& key, const TileFacts& facts, std::uint32_t sl
 
 // A tile's halo reads a little beyond its border.
 void TileCache::invalidate(const TileLattice& lattice, const Extent& place) {
-  for (auto& [key, node] : nodes_) {
+  for (auto at = nodes_.begin(); at != nodes_.end();) {
+    const TileKey& key = at->first;
     const double halo = lattice.step(key.level);
     Extent e = lattice.bounds(key);
     e.xmin -= halo, e.ymin -= halo, e.xmax += halo, e.ymax += halo;
-    node.stale |= e.meets(place);
+    const bool touched = e.meets(place);
+    at->second.stale |= touched;
+    at = touched && at->second.empty ? nodes_.erase(at) : std::next(at);
   }
 }
 

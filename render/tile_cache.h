@@ -55,6 +55,7 @@ class TileCache {
   /// The tile is made. REQUIRES: `slot` was taken, or is kNoSlot for a tile without data.
   void put(const TileKey& key, const TileFacts& facts, std::uint32_t slot);
   /// Tiles that a change of the database reaches will be made anew; until then they are drawn as they are.
+  /// Those without data are forgotten.
   void invalidate(const TileLattice& lattice, const Extent& place);
   void clear();
 

@@ -72,10 +72,11 @@ bool TileFetcher::hold() {
   return running_.empty();
 }
 
-void TileFetcher::release() {
+void TileFetcher::release(bool moved) {
   {
     const std::scoped_lock lock(mutex_);
     held_ = false;
+    if (moved) ready_.clear();
   }
   more_.notify_all();
 }

@@ -30,7 +30,8 @@ class TileFetcher {
   /// No worker begins anything until release(). True if none reads any more: the database may move on; else
   /// ask again a frame later.
   bool hold();
-  void release();
+  /// `moved`: it did, and what was fetched is fetched again.
+  void release(bool moved);
 
  private:
   void work();

@@ -28,7 +28,7 @@ class Selector {
       const std::uint32_t worst = queue_.back();
       queue_.pop_back();
       const TileKey key = out_.leaves[worst].key;
-      if (out_.tiles.at(key) == worst) try_split(worst);
+      if (out_.tiles.at(key) == worst) try_split(worst, out_.leaves[worst].pixels);
     }
     finish();
   }
@@ -54,18 +54,19 @@ class Selector {
     if (!node.empty) cache_.use(key, leaf.pixels);
     if (!leaf.drawn) return;
     ++drawn_;
-    if (node.stale) want(key, std::max(leaf.pixels, options_.pixel_error));
+    if (node.stale) stale_.push_back(place);
     if (leaf.pixels <= options_.pixel_error || key.level == 0) return;
     queue_.push_back(place);
     std::push_heap(queue_.begin(), queue_.end(), worse());
   }
 
-  // Is `key` a leaf, or split? If a larger leaf stands there instead, it is split first.
-  bool make_room(const TileKey& key) {
+  // Is `key` a leaf, or split? If a larger leaf stands there instead, it is split first, as urgently as what
+  // asks for it.
+  bool make_room(const TileKey& key, double pixels) {
     if (!lattice_.contains(key) || out_.tiles.contains(key)) return true;
     const auto above = out_.tiles.find(key.parent());
     if (above == out_.tiles.end() || above->second == Selection::kSplit) return true;  // in what is not drawn
-    return !out_.leaves[above->second].drawn || try_split(above->second);
+    return !out_.leaves[above->second].drawn || try_split(above->second, pixels);
   }
 
   bool children_are_there(const TileKey& key, double pixels) {
@@ -82,19 +83,29 @@ class Selector {
     return all;
   }
 
-  bool try_split(std::uint32_t place) {
+  bool try_split(std::uint32_t place, double pixels) {
     const TileKey key = out_.leaves[place].key;
     if (key.level == 0 || drawn_ + 3 > options_.most_tiles) return false;
-    if (!children_are_there(key, out_.leaves[place].pixels)) return false;
+    if (!children_are_there(key, pixels)) return false;
     for (int s = 0; s < 4; ++s)
-      if (!make_room(key.beside(s))) return false;
+      if (!make_room(key.beside(s), pixels)) return false;
     out_.leaves[place].drawn = false, --drawn_;
     out_.tiles[key] = Selection::kSplit;
     for (int c = 0; c < 4; ++c) add(key.child(c), *cache_.find(key.child(c)));
     return true;
   }
 
+  // What is missing on the screen comes first, then what shows an old state, at last what is not shown
+  // itself.
+  void want_stale() {
+    for (const std::uint32_t k : stale_) {
+      const Selection::Leaf& leaf = out_.leaves[k];
+      want(leaf.key, leaf.drawn ? std::min(leaf.pixels, options_.pixel_error) : -1);
+    }
+  }
+
   void finish() {
+    want_stale();
     for (std::uint32_t k = 0; k < out_.leaves.size(); ++k)
       if (out_.leaves[k].drawn) {
         out_.drawn.push_back(k);
@@ -113,6 +124,7 @@ class Selector {
   TileCache& cache_;
   Selection& out_;
   std::vector<std::uint32_t> queue_;  // heap of places
+  std::vector<std::uint32_t> stale_;  // places that were in sight
   std::size_t drawn_ = 0;
 };
 

@@ -20,7 +20,7 @@ struct Selection {
     double pixels = 0;   ///< the largest error of its mesh on the screen
     bool drawn = false;  ///< else out of sight, or without data
   };
-  /// A tile that is missing, or stale, and how much it matters: pixels.
+  /// A tile that is missing, or stale, and how much it matters: pixels; below 0 for what is not drawn.
   struct Wanted {
     TileKey key;
     double pixels;

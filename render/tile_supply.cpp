@@ -92,6 +92,7 @@ const Selection& TileSupply::update(const Frustum& frustum, FrameStats& stats) {
   for (const std::uint32_t k : selection_.drawn) {
     const Selection::Leaf& leaf = selection_.leaves[k];
     stats.tiles_coarse += leaf.pixels > options_.pixel_error && leaf.key.level > 0;
+    stats.tiles_stale += cache_.find(leaf.key)->stale;
   }
   return selection_;
 }
@@ -100,7 +101,7 @@ void TileSupply::release(bool moved, const std::vector<Extent>& changed, bool an
   if (moved) maker_.restart();
   if (another_lattice) cache_.clear();
   for (const Extent& e : changed) cache_.invalidate(lattice_, e);
-  if (fetcher_) fetcher_->release();  // what was read stays in the database's cache
+  if (fetcher_) fetcher_->release(moved);
 }
 
 }  // namespace patchwork

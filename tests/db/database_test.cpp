@@ -245,7 +245,8 @@ TEST(Database, HeightsStayInMemoryWhereTheirGridDoes) {
   Database writer = two_grids(folder);
   folder.add(writer, heights("1 2 / 3 4", {.accuracy = 0.01}), "later");
   Database reader = Database::open(writer.path());
-  const PatchId stays = grid_named(reader, "later").patch_id(0), goes = grid_named(reader, "fine").patch_id(0);
+  const PatchId stays = grid_named(reader, "later").patch_id(0),
+                goes = grid_named(reader, "fine").patch_id(0);
   const auto kept = reader.surface(stays), gone = reader.surface(goes);
   writer.remove("fine");
   const ImportReport another = folder.add(writer, heights("5 6 / 7 8", {.accuracy = 0.02}), "another");

@@ -245,6 +245,10 @@ class InsertionTest : public VulkanTest {
     Database writer = folder_.database();
     folder_.add(writer, surveys()[k], "survey" + std::to_string(k));
   }
+  void remove(std::size_t k) {
+    Database writer = folder_.database();
+    writer.remove("survey" + std::to_string(k));
+  }
   GridFolder folder_;
 };
 
@@ -265,6 +269,72 @@ TEST_F(InsertionTest, MakesTheTilesAnewThatItTouchesAndNoOther) {
   const Extraction x = extract(db, {.error = 0});
   const Blend best(db, x.patches, {.smoothness = 1});
   EXPECT_LE(screen_error(best, camera, r.depth()).worst, 1.01);
+}
+
+TEST_F(InsertionTest, OnceItIsTakenBackThePictureIsWhatItWasAndNoPatchIsSentAgain) {
+  Database db = reader();
+  Renderer r(test_device(), db, {.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20});
+  const Camera camera{{800, -200, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+  r.draw(camera);
+  const auto before = bits(r.depth());
+  insert(2);
+  EXPECT_TRUE(r.refresh(db));
+  const FrameStats with = r.draw(camera);
+  EXPECT_GT(with.patches_sent, 0u);
+  EXPECT_NE(bits(r.depth()), before);
+  remove(2);
+  EXPECT_TRUE(r.refresh(db));
+  const FrameStats without = r.draw(camera);
+  EXPECT_GT(without.tiles_made, 0u);
+  EXPECT_EQ(without.patches_sent, 0u) << "all that it is made from stayed on the card";
+  EXPECT_EQ(bits(r.depth()), before);
+}
+
+// Where a tile held nothing, a survey may come.
+TEST_F(InsertionTest, OneBesideAllDataIsSeen) {
+  Database db = reader();
+  Renderer r(test_device(), db, {.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20});
+  const Extent e = db.extent();
+  const Camera camera{{e.xmax + 200, 800, 900}, {e.xmax + 201, 800, 300}, 40, kWidth, kHeight};
+  r.draw(camera);
+  const auto covered = [&] {
+    std::size_t n = 0;
+    for (const float d : r.depth()) n += !std::isnan(d);
+    return n;
+  };
+  const std::size_t before = covered();
+  {
+    Database writer = folder_.database();
+    GridFile file = surveys()[0];
+    file.geotransform[0] = e.xmax + 100;
+    folder_.add(writer, file, "beside");
+  }
+  EXPECT_TRUE(r.refresh(db));
+  r.draw(camera);
+  EXPECT_GT(covered(), before + 1000);
+}
+
+TEST_F(InsertionTest, AskingForWhatIsNewHoldsNoWorkerUnlessThereIsSome) {
+  Database db = reader();
+  RendererOptions options{.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20};
+  options.realtime = true, options.make_ms = 1;
+  Renderer r(test_device(), db, options);
+  const Camera camera{{800, -200, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+  FrameStats last = r.draw(camera);
+  for (int n = 0; n < 5000 && last.tiles_wanted > 0; ++n) {
+    EXPECT_FALSE(r.refresh(db));
+    last = r.draw(camera);
+    ASSERT_FALSE(last.workers_held) << "nothing is new";
+  }
+  EXPECT_EQ(last.tiles_wanted, 0u);
+  insert(2);
+  bool moved = false;
+  for (int n = 0; n < 5000 && !moved; ++n) moved = r.refresh(db), last = r.draw(camera);
+  EXPECT_TRUE(moved);
+  EXPECT_FALSE(last.workers_held);
+  EXPECT_GT(last.tiles_stale, 0u) << "old tiles are drawn until they are made anew";
+  for (int n = 0; n < 5000 && last.tiles_wanted > 0; ++n) last = r.draw(camera);
+  EXPECT_EQ(last.tiles_stale, 0u);
 }
 
 TEST_F(InsertionTest, OneFarAwayChangesNoPixel) {

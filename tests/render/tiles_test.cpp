@@ -204,6 +204,52 @@ TEST(TileSelection, WhatIsTooRoughIsWantedAndTheErrorReachedIsTold) {
   EXPECT_GE(few.pixels, s.pixels) << "a smaller pool is a coarser picture, and says so";
 }
 
+// A change makes stale what it touches. Of that, what is in sight is wanted: behind all that is missing, and
+// what is not drawn itself at last.
+TEST(TileSelection, WhatAChangeTouchesIsWantedBehindWhatIsMissing) {
+  const std::uint64_t seed = test_seed(15);
+  std::size_t touched = 0, split = 0;
+  for (std::uint64_t n = 0; n < 20; ++n) {
+    Woods woods(seed + n);
+    const Frustum frustum(woods.camera());
+    Selection before, after;
+    const SelectionOptions options{.pixel_error = 1};
+    select_tiles(woods.lattice(), frustum, options, woods.cache, before);
+    const Extent change{500, 600, 900, 1100};
+    // Empty tiles would be forgotten: they are left out of this.
+    bool some_empty = false;
+    std::set<TileKey> stale;
+    for (const auto& [key, place] : before.tiles) {
+      Extent e = woods.lattice().bounds(key);
+      const double halo = woods.lattice().step(key.level);
+      e.xmin -= halo, e.ymin -= halo, e.xmax += halo, e.ymax += halo;
+      if (!e.meets(change)) continue;
+      const TileCache::Node& node = *woods.cache.find(key);
+      some_empty |= node.empty;
+      if (frustum.sees({woods.lattice().bounds(key), node.facts.lowest, node.facts.highest}))
+        stale.insert(key);
+    }
+    if (some_empty) continue;
+    woods.cache.invalidate(woods.lattice(), change);
+    select_tiles(woods.lattice(), frustum, options, woods.cache, after);
+    EXPECT_EQ(after.tiles.size(), before.tiles.size()) << "old tiles are drawn meanwhile";
+    ASSERT_EQ(after.wanted.size(), before.wanted.size() + stale.size());
+    for (std::size_t k = 0; k < after.wanted.size(); ++k) {
+      const TileKey& key = after.wanted[k].key;
+      if (k < before.wanted.size()) {
+        EXPECT_EQ(key, before.wanted[k].key) << "what is missing comes first";
+        continue;
+      }
+      EXPECT_TRUE(stale.contains(key));
+      const bool drawn = after.tiles.at(key) != Selection::kSplit;
+      EXPECT_EQ(after.wanted[k].pixels >= 0, drawn);
+      ++touched, split += !drawn;
+    }
+  }
+  EXPECT_GT(touched, 100u);
+  EXPECT_GT(split, 20u);
+}
+
 // ---- seams
 // ---------------------------------------------------------------------------------------------------
 

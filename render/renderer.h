@@ -59,6 +59,7 @@ struct FrameStats {
   bool redrawn = false;                                   ///< else the picture is that of the frame before
   BlendCounts blended;                                    ///< of the tiles made
   std::size_t shadow_dispatches = 0, sky_dispatches = 0;  ///< of the light map
+  std::size_t light_texels = 0, light_left = 0;  ///< of it made; heights and texels that are still to come
 };
 
 /// One picture at a time. Not safe for concurrent use.

@@ -33,13 +33,25 @@ Relief::Relief(Point first, double step, int width, int height, std::vector<floa
   }
 }
 
-Relief Relief::of(const Evaluator& surface, const Extent& e, int most) {
+ReliefShape ReliefShape::over(const Extent& e, int most) {
   const double step = std::max(e.xmax - e.xmin, e.ymax - e.ymin) / (most - 1);
   const int width = std::max(2, int(std::ceil((e.xmax - e.xmin) / step - 1e-9)) + 1);
   const int height = std::max(2, int(std::ceil((e.ymax - e.ymin) / step - 1e-9)) + 1);
-  std::vector<double> z(std::size_t(width) * std::size_t(height));
-  surface.at_pixels({e.xmin, step, 0, e.ymin, 0, step}, width, 0, height, {z, {}, {}, {}});
-  return Relief({e.xmin, e.ymin}, step, width, height, std::vector<float>(z.begin(), z.end()));
+  return {{e.xmin, e.ymin}, step, width, height};
+}
+
+Relief Relief::of(const Evaluator& surface, const Extent& e, int most) {
+  const ReliefShape s = ReliefShape::over(e, most);
+  std::vector<double> z(std::size_t(s.width) * std::size_t(s.height));
+  surface.at_pixels({e.xmin, s.step, 0, e.ymin, 0, s.step}, s.width, 0, s.height, {z, {}, {}, {}});
+  return Relief(s, std::vector<float>(z.begin(), z.end()));
+}
+
+double Relief::range() const {
+  float lowest = INFINITY, highest = -INFINITY;
+  for (std::size_t k = 0; k < start(0); ++k)
+    if (levels_[k] != kLow) lowest = std::min(lowest, levels_[k]), highest = std::max(highest, levels_[k]);
+  return lowest <= highest ? double(highest) - double(lowest) : 0;
 }
 
 namespace {
@@ -88,14 +100,18 @@ float tangent_nearby(const Square& from, const Square& near) {
   return std::max(near.slope, (near.highest - from.lowest) / float(Relief::kFirst));
 }
 
-// The tangent under which `seen` is seen from `from` at the most, `apart` squares away in each axis.
-float tangent(const Square& from, const Square& seen, int di, int dj, int side) {
-  const float x = float(std::max(0, std::abs(di) - 1) * side),
-              y = float(std::max(0, std::abs(dj) - 1) * side);
+// Between places of two squares, samples.
+struct Distance {
+  float least, most;
+  Distance(int di, int dj, int side)
+      : least(std::hypot(float(std::max(0, di - 1) * side), float(std::max(0, dj - 1) * side))),
+        most(std::hypot(float((di + 1) * side), float((dj + 1) * side))) {}
+};
+
+// The tangent under which `seen` is seen from `from` at the most.
+float tangent(const Square& from, const Square& seen, const Distance& d) {
   const float rise = seen.highest - from.lowest;
-  if (rise > 0) return rise / std::hypot(x, y);
-  const float far = std::hypot(float((std::abs(di) + 1) * side), float((std::abs(dj) + 1) * side));
-  return rise / far;
+  return rise / (rise > 0 ? d.least : d.most);
 }
 
 }  // namespace
@@ -120,6 +136,9 @@ std::vector<float> Relief::steepest(int side) const {
       s.slope = std::max(s.slope, std::hypot(std::max(std::abs(b - a), std::abs(d - c)),
                                              std::max(std::abs(c - a), std::abs(d - b))));
     }
+  std::vector<Distance> distances;  // by how many squares lie between them, across and down
+  for (int j = 0; j < down; ++j)
+    for (int i = 0; i < across; ++i) distances.emplace_back(i, j, side);
   std::vector<float> most(squares.size());
   for (int j = 0; j < down; ++j)
     for (int i = 0; i < across; ++i) {
@@ -129,8 +148,10 @@ std::vector<float> Relief::steepest(int side) const {
       for (int q = 0; q < down; ++q)
         for (int p = 0; p < across; ++p) {
           const bool near = std::abs(p - i) <= 1 && std::abs(q - j) <= 1;
+          const auto apart =
+              std::size_t(std::abs(q - j)) * std::size_t(across) + std::size_t(std::abs(p - i));
           m = std::max(
-              m, near ? tangent_nearby(from, square(p, q)) : tangent(from, square(p, q), p - i, q - j, side));
+              m, near ? tangent_nearby(from, square(p, q)) : tangent(from, square(p, q), distances[apart]));
         }
       m /= float(step_);
     }

@@ -9,20 +9,38 @@
 
 namespace patchwork::effects {
 
+/// Where the samples of a relief lie.
+struct ReliefShape {
+  Point first;      ///< of sample (0, 0), metres
+  double step = 1;  ///< metres
+  int width = 2, height = 2;
+
+  /// Over the extent, at most `most` a side.
+  static ReliefShape over(const Extent& extent, int most);
+  bool operator==(const ReliefShape& o) const {
+    return first.x == o.first.x && first.y == o.first.y && step == o.step && width == o.width &&
+           height == o.height;
+  }
+};
+
 /// Sample (i, j) lies at (x0 + i step, y0 + j step); the surface between samples is bilinear. Places without
 /// data count as lower than everything.
 class Relief {
  public:
   /// `heights` row-major from the south. REQUIRES: at least 2 x 2 of them.
   Relief(Point first, double step, int width, int height, std::vector<float> heights);
+  Relief(const ReliefShape& s, std::vector<float> heights)
+      : Relief(s.first, s.step, s.width, s.height, std::move(heights)) {}
   /// Samples of `surface` over the extent, at most `most` a side.
   static Relief of(const Evaluator& surface, const Extent& extent, int most);
 
+  ReliefShape shape() const { return {first_, step_, width_, height_}; }
   Point first() const { return first_; }
   double step() const { return step_; }  ///< metres
   int width() const { return width_; }   ///< samples
   int height() const { return height_; }
   std::span<const float> heights() const { return levels_; }  ///< metres; without data: kLow
+  double range() const;  ///< metres: from the lowest to the highest with data
 
   /// Levels of the pyramid of cells: level l has ceil((width - 1) / 2^l) x ceil((height - 1) / 2^l) blocks.
   int top() const { return int(starts_.size()) - 1; }

@@ -60,11 +60,12 @@ ValueScale FrameEffects::overlay_of(std::span<const float> bounds) const {
   return s;
 }
 
-bool FrameEffects::prepare(effects::SceneView view, std::span<const float> bounds) {
+bool FrameEffects::prepare(effects::SceneView view, std::span<const float> bounds,
+                           const LightBudget& budget) {
   bytes_set_ = 0;
   if (wants_map()) {
-    if (!map_.has_heights()) map_.take_heights(db_, scene_.smoothness);
-    view.steepest = map_.steepest();
+    map_.take_heights(db_, scene_.smoothness, budget.ms);
+    view.steepest = map_.has_heights() ? map_.steepest() : -INFINITY;
   }
   const effects::Set before = on_;
   on_ = effects::called_for(scene_, view);
@@ -78,19 +79,19 @@ bool FrameEffects::prepare(effects::SceneView view, std::span<const float> bound
                       (view.camera.eye.y - r.first().y) / r.step(), 1 / r.step(), 0};
   }
   const auto block = effects::block_of(look);
-  if (!changed_ && block == block_ && on_ == before) return false;
+  if (!changed_ && block == block_ && on_ == before) return light_left() > 0;
   block_ = block, changed_ = false;
   std::memcpy(look_.mapped(), block_.data(), sizeof block_);
   bytes_set_ = sizeof block_;
   return true;
 }
 
-void FrameEffects::record_maps(VkCommandBuffer commands) {
+void FrameEffects::record_maps(VkCommandBuffer commands, const LightBudget& budget) {
   const auto only = [&](const auto& effect, Id id) {
     return has(on_, id) ? effect : std::remove_cvref_t<decltype(effect)>();
   };
   map_.record(commands, scene_.effects.sun, only(scene_.effects.shadow, Id::shadow),
-              only(scene_.effects.sky, Id::sky));
+              only(scene_.effects.sky, Id::sky), budget.rays);
 }
 
 void FrameEffects::bind(const Bindings& bindings, VkDescriptorSet set, const TileStore& store) const {

@@ -19,12 +19,19 @@ class FrameEffects {
   /// What the pictures from now on call for.
   void change(const Scene& scene);
   const Scene& scene() const { return scene_; }
-  /// Heights changed: what rests on them is made anew.
-  void heights_changed() { map_.drop_heights(), put_ramps(), changed_ = true; }
+  /// Heights changed there, metres: what rests on them is made anew.
+  void heights_changed(std::span<const Extent> places) {
+    map_.heights_changed(places), put_ramps(), changed_ = true;
+  }
 
   /// Of the next picture: `bounds` of its tiles, metres. Throws Error: what LightMap throws.
-  /// Returns false if all is as it was for the picture before.
-  bool prepare(effects::SceneView view, std::span<const float> bounds);
+  /// Returns false if all is as it was for the picture before, and complete.
+  bool prepare(effects::SceneView view, std::span<const float> bounds, const LightBudget& budget);
+  /// Samples and texels of light that are still to come.
+  std::size_t light_left() const {
+    return map_.left(has(on_, effects::Id::shadow), has(on_, effects::Id::sky));
+  }
+  std::size_t light_texels() const { return map_.texels_made; }
   const effects::Set& on() const { return on_; }
   /// Metres that the ground sinks a square metre of distance.
   double curvature(const effects::SceneView& view) const;
@@ -35,7 +42,7 @@ class FrameEffects {
   std::size_t sky_dispatches() const { return map_.sky_dispatches; }
 
   /// Outside of a render pass, before anything is bound: makes stale maps.
-  void record_maps(VkCommandBuffer commands);
+  void record_maps(VkCommandBuffer commands, const LightBudget& budget);
 
   /// What effects.glsl binds, from binding kFirst on; changes with the generation.
   static constexpr std::uint32_t kFirst = 5;

@@ -15,6 +15,7 @@ layout(push_constant) uniform Push {
   vec2 to_sun;                     // unit
   float least, enough;             // tangents: below the one nothing changes, above the other nothing more
   int start[12];                   // of the pyramid's levels
+  int region[4];                   // texels that are made: x, y from, x, y to
 } push;
 
 const int kSquare = 16;
@@ -41,8 +42,8 @@ float open_part(vec2 p, float z) {
 }
 
 void main() {
-  const ivec2 texel = ivec2(gl_GlobalInvocationID.xy), size = imageSize(map);
-  if (texel.x >= size.x || texel.y >= size.y) return;
+  const ivec2 texel = ivec2(push.region[0], push.region[1]) + ivec2(gl_GlobalInvocationID.xy);
+  if (texel.x >= push.region[2] || texel.y >= push.region[3]) return;
   const ivec2 at = min(texel * push.stride, ivec2(push.width, push.height) - 1);
   const float z = height_at(at.x, at.y);
   const ivec2 square = min(at, ivec2(push.width, push.height) - 2) / kSquare;

@@ -253,6 +253,76 @@ TEST_F(CountersTest, EachChangeMakesAnewWhatRestsOnIt) {
   EXPECT_EQ(row(moved), (Row{0, 0, 0, 0})) << "nothing";
 }
 
+// Light comes in slices while a camera flies: a bounded part a frame, full light until then.
+TEST_F(CountersTest, LightOfAFlightComesInSlicesAndEndsAsTheSamePicture) {
+  {
+    Database writer = folder_.database();
+    folder_.add(writer, surveys()[1], "fine");  // 226 x 200 samples
+  }
+  const Database db = folder_.database();
+  SceneEffects e = lit(120, 12);
+  Renderer plain = renderer_of(db, e, 1);
+  e.shadow = effects::Shadow{}, e.sky = effects::Sky{};
+  Renderer waits = renderer_of(db, e, 1);
+  const FrameStats whole = waits.draw(kCamera);
+  EXPECT_EQ(whole.light_left, 0u);
+  EXPECT_EQ(whole.shadow_dispatches, 1u);
+  Renderer flies(test_device(), db,
+                 {.width = kWidth,
+                  .height = kHeight,
+                  .memory = std::size_t{256} << 20,
+                  .realtime = true,
+                  .effects = e,
+                  .legend = false});
+  FrameStats s = flies.draw(kCamera);
+  EXPECT_GT(s.light_left, 0u);
+  std::size_t texels = s.light_texels, frames = 1;
+  for (; frames < 5000 && (s.tiles_wanted > 0 || s.light_left > 0); ++frames) {
+    s = flies.draw(kCamera);
+    texels += s.light_texels;
+    ASSERT_LT(s.light_texels, whole.light_texels / 4);
+  }
+  EXPECT_EQ(texels, whole.light_texels) << "each is made once";
+  EXPECT_GT(frames, 5u);
+  EXPECT_EQ(most_difference(flies.picture(), waits.picture()), 0);
+  plain.draw(kCamera);
+  EXPECT_GT(most_difference(plain.picture(), waits.picture()), 20) << "the control";
+  EXPECT_EQ(flies.draw(kCamera).draws, 0u) << "nothing is left to do";
+}
+
+TEST_F(CountersTest, ASurveyMakesTheLightAnewThatItReachesAndNoOther) {
+  {
+    Database writer = folder_.database();
+    folder_.add(writer, surveys()[1], "fine");
+  }
+  Database db = folder_.database();
+  SceneEffects e = lit(120, 12);
+  e.shadow = effects::Shadow{}, e.sky = effects::Sky{};
+  Renderer r = renderer_of(db, e, 1);
+  const FrameStats first = r.draw(kCamera);
+  {
+    Database writer = folder_.database();
+    const GridFile small =
+        survey({.width = 30, .height = 30, .geotransform = rotated(500, 700, 10, 8, 8)}, 0.05);
+    folder_.add(writer, small, "small");
+  }
+  EXPECT_TRUE(r.refresh(db));
+  const FrameStats second = r.draw(kCamera);
+  EXPECT_GT(second.shadow_dispatches, 0u);
+  EXPECT_GT(second.light_texels, 0u);
+  EXPECT_LT(second.light_texels, first.light_texels / 2);
+  const Image part = r.picture();
+  // All of it made anew is the same light.
+  SceneEffects other = e;
+  other.sun->azimuth = 300, other.sky->directions = 4;
+  r.change(other);
+  r.draw(kCamera);
+  EXPECT_GT(most_difference(r.picture(), part), 20) << "the control";
+  r.change(e);
+  EXPECT_EQ(r.draw(kCamera).light_texels, first.light_texels);
+  EXPECT_EQ(most_difference(r.picture(), part), 0);
+}
+
 TEST_F(CountersTest, AnOverlayThatSlotsDoNotKnowIsRefused) {
   const Database db = folder_.database();
   Renderer r = renderer_of(db, lit(120, 30), 1);

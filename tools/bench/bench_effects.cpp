@@ -101,6 +101,37 @@ Work measure(const std::shared_ptr<Device>& device, const Database& db, const Ca
           {{"adds_ms", mine.median - bare.median}, {"stored_once_ms", ours.stored_ms()}}};
 }
 
+// Shadow and sky are switched on: frames of a flight until their light is complete, the one frame that waits
+// for it, and the flight's frames before.
+Work light_coming(const std::shared_ptr<Device>& device, const Database& db) {
+  SceneEffects lit = sun_alone();
+  lit.shadow = effects::Shadow{}, lit.sky = effects::Sky{};
+  Camera camera = camera_of(db);
+  RendererOptions options{.width = kWidth, .height = kHeight, .effects = sun_alone(), .legend = false};
+  Renderer waits(device, db, options);
+  options.realtime = true;
+  Renderer flies(device, db, options);
+  const auto frame = [&](Renderer& r) {
+    camera.eye.x += 0.01;
+    return r.draw(camera);
+  };
+  while (frame(flies).tiles_wanted > 0) continue;
+  std::vector<double> before, coming;
+  for (int n = 0; n < 20; ++n) before.push_back(frame(flies).total_ms);
+  flies.change(lit);
+  for (bool complete = false; !complete;) {
+    const FrameStats s = frame(flies);
+    coming.push_back(s.total_ms), complete = s.light_left == 0;
+  }
+  frame(waits);
+  waits.change(lit);
+  const std::vector<double> at_once = {frame(waits).total_ms};
+  Work w{"frames while shadow and sky come", "ms", true, Spread::of(coming), {}, {{"frames", coming.size()}}};
+  w.peers.emplace_back("the frame that waits for them", Spread::of(at_once));
+  w.peers.emplace_back("frames before", Spread::of(before));
+  return w;
+}
+
 }  // namespace
 
 std::vector<Work> bench_effects(const BenchOptions& o) {
@@ -112,7 +143,7 @@ std::vector<Work> bench_effects(const BenchOptions& o) {
                "--quiet"});
   const Database db = Database::open(path);
   const auto device = Device::open();
-  std::vector<Work> all;
+  std::vector<Work> all = {light_coming(device, db)};
   for (const Case& c : cases(db)) all.push_back(measure(device, db, c, o.runs));
   return all;
 }

@@ -21,8 +21,9 @@ constexpr int kWidth = 640, kHeight = 360;
 constexpr double kPixelError = 2;
 constexpr int kPolicyFrames = 120;
 constexpr double kEnough = 0.99;  // share of tiles at the asked error
-constexpr double kFlightSeconds = 3, kSettleSeconds = 1;
-constexpr double kSlowest = 50;  // metres a second; doubled while it goes well
+constexpr double kFlightSeconds = 3, kSettleSeconds = 0.5,
+                 kFirstSeconds = 4;  // before the first: all is read
+constexpr double kSlowest = 50;      // metres a second; doubled while it goes well
 constexpr int kDoublings = 10;
 
 using Clock = std::chrono::steady_clock;
@@ -156,7 +157,7 @@ struct Flown {
   }
 };
 
-Flown fly(Renderer& r, Database& db, const Path& path, double speed, double& way) {
+Flown fly(Renderer& r, Database& db, const Path& path, double speed, double settle, double& way) {
   Flown f;
   const auto start = Clock::now();
   const auto seconds_since = [](Clock::time_point t) {
@@ -169,9 +170,9 @@ Flown fly(Renderer& r, Database& db, const Path& path, double speed, double& way
     const double refreshing = 1000 * seconds_since(begun);
     const FrameStats s = r.draw(path.at(way));
     way += speed * seconds_since(before), before = Clock::now();
-    if (seconds_since(start) < kSettleSeconds) continue;
+    if (seconds_since(start) < settle) continue;
     f.add(s), f.moves += moved, f.refresh += refreshing;
-    if (seconds_since(start) > kSettleSeconds + kFlightSeconds) return f;
+    if (seconds_since(start) > settle + kFlightSeconds) return f;
   }
 }
 
@@ -195,7 +196,7 @@ Work speed(const std::shared_ptr<Device>& device, const SurveyedLand& land, int 
   Json tried = Json::array();
   for (int n = 0; n < kDoublings; ++n) {
     const double metres = std::ldexp(kSlowest, n);
-    const Flown f = fly(r, db, path, metres, way);
+    const Flown f = fly(r, db, path, metres, n == 0 ? kFirstSeconds : kSettleSeconds, way);
     tried.push_back(f.json(metres));
     if (f.share() < kEnough) break;
     best = metres;

@@ -25,18 +25,35 @@ double stretch(double x, double y, double up, double ahead) { return std::hypot(
 }  // namespace
 
 Frustum::Frustum(const Camera& camera, double curvature, double far)
-    : eye_(camera.eye), curvature_(curvature), far_(far) {
+    : eye_(camera.eye), curvature_(curvature), far_(far), gamma_(camera.gamma()) {
   const CameraAxes a = axes(camera);
   const double ty = camera.tan_half(), tx = ty * camera.width / camera.height;
-  axis_ = numbers(a.forward);
+  axis_ = numbers(a.forward), right_ = numbers(a.right), up_ = numbers(a.up), wide_ = tx, high_ = ty;
   sides_ = {numbers(glm::normalize(tx * a.forward + a.right)),
             numbers(glm::normalize(tx * a.forward - a.right)), numbers(glm::normalize(ty * a.forward + a.up)),
             numbers(glm::normalize(ty * a.forward - a.up))};
-  // Convex over the screen: largest in a corner.
+}
+
+// Over the part of the picture where the box may be; convex there, so largest in a corner. REQUIRES: all of
+// the box is ahead. factors.comp does the same.
+double Frustum::stretch_in(const Box3& b) const {
+  double x[2] = {INFINITY, -INFINITY}, y[2] = {INFINITY, -INFINITY};
+  for (int k = 0; k < 8; ++k) {
+    const double p[3] = {k & 1 ? b.place.xmax : b.place.xmin, k & 2 ? b.place.ymax : b.place.ymin,
+                         k & 4 ? b.highest : b.lowest};
+    const auto along = [&](const std::array<double, 3>& n) {
+      return n[0] * p[0] + n[1] * p[1] + n[2] * p[2];
+    };
+    const double depth = along(axis_), tx = along(right_) / depth, ty = along(up_) / depth;
+    x[0] = std::min(x[0], tx), x[1] = std::max(x[1], tx);
+    y[0] = std::min(y[0], ty), y[1] = std::max(y[1], ty);
+  }
   double most = 0;
-  for (const double x : {-tx, tx})
-    for (const double y : {-ty, ty}) most = std::max(most, stretch(x, y, a.up.z, a.forward.z));
-  gamma_ = camera.gamma() * most;
+  for (const double tx : x)
+    for (const double ty : y)
+      most = std::max(
+          most, stretch(std::clamp(tx, -wide_, wide_), std::clamp(ty, -high_, high_), up_[2], axis_[2]));
+  return most;
 }
 
 // Relative to the eye, and lowered by the earth's curvature.
@@ -61,8 +78,9 @@ bool Frustum::sees(const Box3& box) const {
 }
 
 double Frustum::pixels_per_metre(const Box3& box) const {
-  const double nearest = -largest_along(opposite(axis_), bent(box));
-  return nearest > 0 ? gamma_ / nearest : std::numeric_limits<double>::infinity();
+  const Box3 b = bent(box);
+  const double nearest = -largest_along(opposite(axis_), b);
+  return nearest > 0 ? gamma_ * stretch_in(b) / nearest : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace patchwork

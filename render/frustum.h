@@ -27,17 +27,16 @@ class Frustum {
   /// box reaches the eye's plane. With the depth along the view's axis, because a pixel at the picture's edge
   /// is farther away than the one in its middle at the same depth.
   double pixels_per_metre(const Box3& box) const;
-  /// Largest factor by which perspective stretches vertical displacements, for depth 1 metre, pixels.
-  double gamma() const { return gamma_; }
   /// Inward normals of the four sides (through the eye), and the view's axis.
   const std::array<std::array<double, 3>, 4>& sides() const { return sides_; }
   const std::array<double, 3>& axis() const { return axis_; }
 
  private:
   Box3 bent(const Box3& box) const;
+  double stretch_in(const Box3& bent) const;
   Point3 eye_;
-  double curvature_, far_, gamma_;
-  std::array<double, 3> axis_;
+  double curvature_, far_, gamma_, wide_, high_;  // tangents of half the picture
+  std::array<double, 3> axis_, right_, up_;
   std::array<std::array<double, 3>, 4> sides_;
 };
 

@@ -123,10 +123,8 @@ struct Renderer::Impl {
     b.eye[0] = float(camera.eye.x - (lattice.origin().x + cell[0] * lattice.half_cell()));
     b.eye[1] = float(camera.eye.y - (lattice.origin().y + cell[1] * lattice.half_cell()));
     b.eye[2] = float(base - camera.eye.z), b.eye[3] = float(lattice.half_cell());
-    // As published: pixels per unit of tangent, though a picture's corners show more of them.
-    const double gamma = options.published ? camera.gamma() : frustum.gamma();
-    b.detail[0] = float(gamma / options.pixel_error), b.detail[1] = float(curvature);
-    b.detail[2] = float(gamma), b.detail[3] = options.published;
+    b.detail[0] = float(camera.gamma() / options.pixel_error), b.detail[1] = float(curvature);
+    b.detail[3] = options.published;
     return b;
   }
 

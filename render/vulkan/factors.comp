@@ -15,10 +15,27 @@ layout(binding = 3) uniform samplerBuffer blocks;  // two texels a block, metres
 layout(binding = 4) writeonly buffer Factors { uint factors[]; };
 
 const uint kOut = 256u;
+const float kFar = 1e30;
 
 // The largest of dot(n, corner).
 float largest_along(vec3 n, vec3 low, vec3 high) {
   return n.x * (n.x > 0 ? high.x : low.x) + n.y * (n.y > 0 ? high.y : low.y) + n.z * (n.z > 0 ? high.z : low.z);
+}
+
+// What perspective makes of a vertical metre in the part of the picture where the box may be, for one across the
+// line of sight: Frustum::stretch_in. All of the box is ahead.
+float stretch_in(vec3 low, vec3 high) {
+  const vec2 half_picture = vec2(length(frame.right.xyz), length(frame.up.xyz));
+  vec2 least = vec2(kFar), most = vec2(-kFar);
+  for (int k = 0; k < 8; ++k) {
+    const vec3 p = vec3((k & 1) != 0 ? high.x : low.x, (k & 2) != 0 ? high.y : low.y, (k & 4) != 0 ? high.z : low.z);
+    const vec2 at = vec2(dot(frame.right.xyz, p), dot(frame.up.xyz, p)) / (half_picture * dot(frame.axis.xyz, p));
+    least = min(least, at), most = max(most, at);
+  }
+  least = clamp(least, -half_picture, half_picture), most = clamp(most, -half_picture, half_picture);
+  const float ahead = frame.axis.z, up = frame.up.z / half_picture.y;
+  const float across = max(abs(least.x), abs(most.x)) * ahead;
+  return 1.0001 * length(vec2(across, max(abs(up - least.y * ahead), abs(up - most.y * ahead))));
 }
 
 void main() {
@@ -41,7 +58,9 @@ void main() {
   const vec3 error = published ? vec3(errors.w, range.zw) : errors.xyz;
   uint segments = 8;
   if (nearest > frame.axis.w) {
-    const float allowed = nearest / frame.detail.x - (published ? 0.0 : facts_at(d).x);
+    // As published: one number for all of the picture, though its corners show more.
+    const float stretch = published ? 1.0 : stretch_in(bottom, top);
+    const float allowed = nearest / (frame.detail.x * stretch) - (published ? 0.0 : facts_at(d).x);
     if (error.z <= allowed) segments = 1;
     else if (error.y <= allowed) segments = 2;
     else if (error.x <= allowed) segments = 4;

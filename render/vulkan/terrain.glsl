@@ -7,8 +7,8 @@ layout(binding = 0) uniform FrameBlock {
   vec4 axis;       // of the view; w: where the near plane is
   vec4 right, up;  // of the view, to the picture's edges at depth 1; w: 2 / width, 2 / height, pixels
   vec4 eye;        // xy: what the eye's place is past its half cell; z: base of the heights - the eye's; w: half cell
-  vec4 detail;     // x: gamma / pixel error: metres of depth for a metre of error; y: curvature, 1/metre;
-                   // z: gamma; w: 1 for the published choices (factors.comp)
+  vec4 detail;     // x: gamma / pixel error: metres of depth for a metre of error across the line of sight;
+                   // y: curvature, 1/metre; w: 1 for the published choices (factors.comp)
 } frame;
 layout(binding = 1) uniform usamplerBuffer draws;  // TileDraw of tile_seams.h, kDraw texels each
 layout(binding = 2) uniform samplerBuffer heights; // metres over the base; kVertices^2 a slot

@@ -155,6 +155,45 @@ class Woods {
   TileLattice lattice_;
 };
 
+// By a millimetre up and down anywhere in a box where the picture shows it.
+TEST(Frustum, AVerticalMetreInABoxTakesNoMorePixelsThanItSays) {
+  std::mt19937_64 random(test_seed(17));
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  std::size_t seen = 0;
+  double tightest = 0, sum = 0;
+  for (int n = 0; n < 20000; ++n) {
+    const Point3 eye{uniform(-500, 500), uniform(-500, 500), uniform(0, 500)};
+    const Camera camera{eye,
+                        {eye.x + uniform(-1, 1), eye.y + uniform(-1, 1), eye.z + uniform(-1.5, 0.7)},
+                        uniform(20, 100),
+                        640,
+                        360};
+    const Frustum frustum(camera);
+    const double x = uniform(-1000, 1000), y = uniform(-1000, 1000), z = uniform(-100, 300),
+                 s = uniform(1, 80);
+    const Box3 box{{x, y, x + s, y + s}, z, z + uniform(0, 50)};
+    if (!frustum.sees(box) || !std::isfinite(frustum.pixels_per_metre(box))) continue;
+    const double allowed = frustum.pixels_per_metre(box);
+    double most = 0;
+    for (int k = 0; k < 12; ++k) {
+      const Point3 p{uniform(x, x + s), uniform(y, y + s), uniform(z, box.highest)};
+      const Seen here = see(camera, p);
+      if (here.axial <= 0 || here.x < 0 || here.y < 0 || here.x > camera.width || here.y > camera.height)
+        continue;
+      const Seen low = see(camera, {p.x, p.y, p.z - 1e-3}), high = see(camera, {p.x, p.y, p.z + 1e-3});
+      most = std::max(most, std::hypot(high.x - low.x, high.y - low.y) / 2e-3);
+    }
+    if (most == 0) continue;
+    ++seen, sum += most / allowed, tightest = std::max(tightest, most / allowed);
+    ASSERT_LE(most, allowed * 1.0001) << "box " << n;
+  }
+  EXPECT_GT(seen, 500u);
+  EXPECT_GT(tightest, 0.9) << "and not many more";
+  std::printf("%zu boxes, %.2f of it on average\n", seen, sum / double(seen));
+}
+
 TEST(TileSelection, CoversTheRootOnceAndNeighboursDifferByOneLevel) {
   const std::uint64_t seed = test_seed(7);
   int differing = 0;

@@ -21,6 +21,8 @@
 //   u32 drops; each: u64 id
 // A sheet's blob holds its patches' windows one below the other, cut to `side` samples; behind them, where it
 // carries holes, as many windows of bits: 0 answering, 1 real, 2 to 5 near, 6 to 9 wide.
+// Zeros follow where the update would else be shorter than least_bytes(): few bytes never ask for much
+// memory.
 
 namespace patchwork {
 
@@ -28,9 +30,15 @@ namespace {
 
 constexpr std::uint32_t kMagic = 0x31555750;
 constexpr std::size_t kMostStructure = std::size_t{1} << 28;
-constexpr std::uint32_t kMostPatches = 1u << 20;  // of a sheet
+// Of an update with a patch, which takes 7 to 13 KB in memory; flat land would do with less, hills take more.
+constexpr std::size_t kLeastBytes = 64;
+// Structure for each byte of an update: 148 bytes suffice for a patch, its sheet and its source, 8 for a
+// drop.
+constexpr std::size_t kMostPacking = 16;
 constexpr int kSide = PatchSurface::kSide;
 constexpr int kMargin = kExtensionCells + 1;  // window vertices before the block
+
+std::size_t least_bytes(std::size_t patches, std::size_t drops) { return kLeastBytes * patches + drops; }
 
 [[noreturn]] void refuse(const char* problem) { throw Error("update", problem, "ask for it again"); }
 
@@ -79,6 +87,9 @@ class Reader {
     return taken;
   }
   bool done() const { return left_.empty(); }
+  bool only_zeros() const {
+    return std::all_of(left_.begin(), left_.end(), [](std::byte b) { return b == std::byte{0}; });
+  }
 
  private:
   std::span<const std::byte> left_;
@@ -190,9 +201,10 @@ struct Expected {
   std::size_t first = 0, count = 0, bytes = 0;
 };
 
-Expected get_sheet(Reader& r, Update& u) {
+// `most`: patches of all sheets.
+Expected get_sheet(Reader& r, Update& u, std::uint32_t most) {
   Expected e;
-  e.side = int(r.at_most(kSide)), e.first = u.add.size(), e.count = r.at_most(kMostPatches);
+  e.side = int(r.at_most(kSide)), e.first = u.add.size(), e.count = r.at_most(most - std::uint32_t(e.first));
   e.holes = r.at_most(1) != 0, e.bytes = r.get<std::uint32_t>();
   if (e.side < 4 || e.count == 0) refuse("a sheet of it is empty");
   for (std::size_t k = 0; k < e.count; ++k) u.add.push_back(get_patch(r, u.sources));
@@ -247,23 +259,28 @@ std::vector<std::byte> encode_update(const Database& db, const Difference& diffe
   std::vector<std::byte> bytes = all.take();
   bytes.insert(bytes.end(), packed.begin(), packed.end());
   for (const auto& blob : blobs) bytes.insert(bytes.end(), blob.begin(), blob.end());
+  bytes.resize(std::max(bytes.size(), least_bytes(difference.add.size(), difference.drop.size())));
   return bytes;
 }
 
 Update decode_update(std::span<const std::byte> bytes) {
   Reader all(bytes);
   if (all.get<std::uint32_t>() != kMagic) refuse("it has an unknown format");
-  const auto structure = unpack(all.take(all.get<std::uint32_t>()), kMostStructure);
+  const auto structure =
+      unpack(all.take(all.get<std::uint32_t>()), std::min(kMostStructure, kMostPacking * bytes.size()));
   if (!structure) refuse("its structure cannot be read");
   Reader r(*structure);
   Update u;
   for (std::uint32_t n = r.at_most(0xffff); n > 0; --n) u.sources.push_back(get_source(r));
   std::vector<Expected> sheets;
-  for (std::uint32_t n = r.at_most(2 * kSide); n > 0; --n) sheets.push_back(get_sheet(r, u));
+  const auto most = std::uint32_t(std::min<std::size_t>(bytes.size() / kLeastBytes, UINT32_MAX));
+  for (std::uint32_t n = r.at_most(2 * kSide); n > 0; --n) sheets.push_back(get_sheet(r, u, most));
   for (std::uint32_t n = r.get<std::uint32_t>(); n > 0; --n) u.drop.push_back({r.get<std::uint64_t>()});
   if (!r.done()) refuse("it is longer than it says");
   for (const Expected& e : sheets) fill(u, e, all.take(e.bytes));
-  if (!all.done()) refuse("it is longer than it says");
+  if (!all.done() && bytes.size() != least_bytes(u.add.size(), u.drop.size()))
+    refuse("it is longer than it says");
+  if (!all.only_zeros()) refuse("there is something where zeros should be");
   return u;
 }
 

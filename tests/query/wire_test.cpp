@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <random>
 
+#include "db/pack.h"
 #include "tests/db/databases.h"
 #include "tests/grids.h"
 #include "tests/seed.h"
@@ -95,6 +97,60 @@ TEST_F(Wire, NothingIsSentForNothing) {
   EXPECT_LT(bytes.size(), 64u);
   const Update u = decode_update(bytes);
   EXPECT_TRUE(u.add.empty() && u.drop.empty() && u.sources.empty());
+}
+
+std::vector<std::byte> with_structure(const std::vector<std::byte>& structure) {
+  const std::vector<std::byte> packed = pack(structure);
+  const std::uint32_t head[] = {0x31555750, std::uint32_t(packed.size())};
+  const auto bits = std::as_bytes(std::span(head));
+  std::vector<std::byte> all(bits.begin(), bits.end());
+  all.insert(all.end(), packed.begin(), packed.end());
+  return all;
+}
+
+TEST_F(Wire, FewBytesAskForLittleMemory) {
+  const std::vector<std::byte> whole = encode_update(*db_, {{from_nothing(3).add.front()}, {}});
+  std::uint32_t length = 0;
+  std::memcpy(&length, whole.data() + 4, 4);
+  const std::vector<std::byte> one = *unpack(std::span(whole).subspan(8, length), 1 << 20);
+  constexpr std::size_t kSource = 92, kCount = 4 + kSource + 4 + 4, kPatch = 40, kPatches = 100000;
+  std::vector<std::byte> many(one.begin(), one.begin() + kCount + 12);  // up to the sheet's patches
+  const std::uint32_t count = kPatches;
+  std::memcpy(many.data() + kCount, &count, 4);
+  for (std::size_t k = 0; k < kPatches; ++k)
+    many.insert(many.end(), one.begin() + kCount + 12, one.begin() + kCount + 12 + kPatch);
+  many.resize(many.size() + 4);  // no drops
+  std::vector<std::byte> update = with_structure(many);
+  EXPECT_LT(update.size(), kPatches / 4) << "negative control: so many patches in so few bytes";
+  EXPECT_THROW(decode_update(update), Error);
+  update.resize(many.size() / 8);  // the structure may be so long, the patches not so many
+  try {
+    decode_update(update);
+    ADD_FAILURE() << "it was taken";
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find("impossible number"), std::string::npos) << e.what();
+  }
+}
+
+TEST_F(Wire, FlatLandArrivesWhole) {
+  const GridFolder folder;
+  Database flat = folder.database();
+  folder.add(flat, {.width = 1200, .height = 900, .at = [](int, int) { return 7.; }}, "flat");
+  Difference d;
+  const GridInfo& grid = flat.grids().front().info;
+  for (int by = 0; by < int(grid.shape.blocks_j(0)); ++by)
+    for (int bx = 0; bx < int(grid.shape.blocks_i(0)); ++bx)
+      d.add.push_back(PatchId::make(grid.id, 0, bx, by));
+  d.drop = d.add;
+  const std::vector<std::byte> bytes = encode_update(flat, d);
+  EXPECT_EQ(bytes.size(), 65 * d.add.size()) << "zeros fill it up";
+  const Update u = decode_update(bytes);
+  EXPECT_EQ(u.add.size(), d.add.size());
+  EXPECT_EQ(u.drop, d.drop);
+  std::vector<std::byte> longer = bytes, other = bytes;
+  longer.push_back(std::byte{0}), other.back() = std::byte{1};
+  EXPECT_THROW(decode_update(longer), Error);
+  EXPECT_THROW(decode_update(other), Error);
 }
 
 TEST_F(Wire, DamageIsRefusedOrHarmless) {

@@ -10,8 +10,8 @@ class CostTest : public CliTest {
  protected:
   /// Small enough for a test; timings are not looked at.
   Words cost(const std::string& database, const std::string& folder) const {
-    return {"cost",   database, in_directory(folder), "--size", "64",
-            "--runs", "1",      "--points",           "4000",   "--json"};
+    return {"cost",      database, in_directory(folder), "--size", "64",    "--runs", "1",
+            "--seconds", "0",      "--points",           "4000",   "--json"};
   }
   Json rows(const std::string& folder) const {
     return Json::parse(text_of(in_directory(folder + "/cost.json")), nullptr, false);
@@ -29,7 +29,7 @@ TEST_F(CostTest, EveryMeasuredErrorKeepsToItsBound) {
   const Json all = rows("out");
   ASSERT_TRUE(all.is_array());
   ASSERT_EQ(all.size(), facts["rows"]);
-  int ladder = 0, bounded = 0, differ = 0, frames = 0;
+  int ladder = 0, bounded = 0, differ = 0, frames = 0, skies = 0;
   for (const Json& r : all) {
     for (const char* key :
          {"knob", "value", "error_asked", "bound", "error_max", "error_p99", "error_rms", "patches", "bytes",
@@ -40,16 +40,18 @@ TEST_F(CostTest, EveryMeasuredErrorKeepsToItsBound) {
     EXPECT_LE(r["error_rms"], r["error_max"]);
     if (r["bound"].is_null()) continue;
     ++bounded, differ += r["error_max"] > 0;
-    const bool drawn = r["knob"] == "frame" || r["knob"] == "tessellation";
+    const bool drawn = !r["ms_draw"].is_null();
+    skies += r["knob"] == "sky_directions";
     EXPECT_LE(double(r["error_max"]), double(r["bound"]) * (drawn ? 1.001 : 1) + (drawn ? 0.01 : 0))
         << r["knob"] << " " << r["value"];
     frames += drawn;
-    EXPECT_EQ(drawn, !r["ms_draw"].is_null());
+    EXPECT_EQ(drawn, r["knob"] == "frame" || r["knob"] == "tessellation" || r["knob"] == "sky_directions");
     EXPECT_GT(r["patches"], 0);
     EXPECT_GE(r["ms_blend"], 0);
   }
   EXPECT_EQ(ladder, 15);
-  EXPECT_EQ(frames, 6) << "published tessellation has no bound";
+  EXPECT_EQ(frames, 11) << "published tessellation has no bound";
+  EXPECT_EQ(skies, 5) << "no sky light, and that of 4, 8, 16 and 32 directions";
   EXPECT_GT(bounded, 50);
   EXPECT_GT(differ, 20) << "negative control: coarser answers depart from the best";
 }

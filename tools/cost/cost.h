@@ -1,6 +1,8 @@
 // What `patchwork cost` measures: rows of knobs, the uniform grid beside them, and what is made of both.
 #pragma once
 
+#include <chrono>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,7 +20,8 @@ struct CostOptions {
   std::vector<double> extent;  ///< xmin ymin xmax ymax; empty: all, or as much as kMostPatches allow
   std::string scene;     ///< a file; its camera is that of the views; empty: one over the south-west corner
   int side = 512;        ///< heights along each side of the picture
-  int runs = 5;          ///< measured; one more comes before to warm up
+  int runs = 5;          ///< measured at least; one more comes before to warm up
+  double seconds = 150;  ///< that all may take before it stays at `runs`
   int points = 1 << 17;  ///< at which errors are measured
 };
 
@@ -32,7 +35,7 @@ struct ErrorFigures {
 
 /// Milliseconds of the stages, over the runs. What was not there to be measured has no values.
 struct Stages {
-  std::vector<double> query, fetch, blend, tessellate, draw;
+  std::vector<double> query, fetch, blend, tessellate, draw, light;
   std::vector<double> total() const;    ///< of each run
   std::vector<double> at_hand() const;  ///< of each run, without fetch: patches are in memory
 };
@@ -54,6 +57,19 @@ struct CostRow {
   std::size_t beyond = 0;  ///< points farther from the best than both bounds allow, or without an answer
 };
 
+/// A setting whose facts are known, and how its time is taken.
+struct Measurable {
+  CostRow row;
+  std::function<void(Stages&)> once;  ///< adds a run
+};
+/// Measures each in turn, A B C A B C, so that whatever disturbs the machine for a while disturbs all of
+/// them: once to warm up, `runs` times, and on until the median of each is known to kSure of itself, `until`
+/// has come, or kMostRuns were made. `progress` is told the share that is done.
+void measure(std::vector<Measurable>& all, int runs, std::chrono::steady_clock::time_point until,
+             const std::function<void(double)>& progress);
+inline constexpr double kSure = 0.015;  ///< standard error
+inline constexpr int kMostRuns = 100;
+
 /// A picture of the renderer.
 struct FrameScene {
   Camera camera;
@@ -64,10 +80,10 @@ struct FrameScene {
 /// extent. Throws Error: the scene's file.
 FrameScene frame_scene(const Database& db, const Extent& extent, const std::string& scene_file,
                        std::uint64_t memory);
-/// Pixel errors and ways of tessellating: errors in pixels, measured against the best surface through each
-/// pixel's depth. Throws Error: a device that does not draw.
-std::vector<CostRow> measure_frames(const Database& db, std::shared_ptr<Device> device,
-                                    const FrameScene& scene, int runs);
+/// Pixel errors, ways of tessellating and directions of sky light: errors in pixels, measured against the
+/// best surface through each pixel's depth. Refers to `db`. Throws Error: a device that does not draw.
+std::vector<Measurable> frame_settings(const Database& db, std::shared_ptr<Device> device,
+                                       const FrameScene& scene);
 
 /// What a time buys: the finest step of the ladder whose median is at most `ms`.
 struct Bargain {

@@ -36,12 +36,13 @@ Json json_of(const CostRow& r) {
   Json spreads = Json::object();
   put_stage(spreads, "query", r.ms.query), put_stage(spreads, "fetch", r.ms.fetch);
   put_stage(spreads, "blend", r.ms.blend), put_stage(spreads, "tessellate", r.ms.tessellate);
-  put_stage(spreads, "draw", r.ms.draw);
+  put_stage(spreads, "draw", r.ms.draw), put_stage(spreads, "light", r.ms.light);
   put_stage(spreads, "total", r.ms.total());
-  for (const char* stage : {"query", "fetch", "blend", "tessellate", "draw", "total"})
+  for (const char* stage : {"query", "fetch", "blend", "tessellate", "draw", "light", "total"})
     j[std::string("ms_") + stage] = spreads[std::string("ms_") + stage];
   j["bound_p99"] = r.bound ? Json(r.bound_p99) : Json();
   j["unit"] = r.unit, j["samples"] = r.samples, j["file_bytes"] = r.file_bytes;
+  j["runs"] = r.ms.total().size();
   j["predicted_ms"] = number(r.predicted), j["fitted"] = r.fitted, j["beyond"] = r.beyond;
   j.update(spreads);
   return j;

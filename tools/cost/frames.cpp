@@ -1,4 +1,5 @@
-// The knobs of a picture: pixel error and the way of tessellating, each frame made from nothing.
+// The knobs of a picture: pixel error, the way of tessellating and the directions of sky light, each frame
+// made from nothing.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -17,11 +18,27 @@ constexpr double kTessellated = 2;                     // pixels: where the ways
 // Vertices are placed in float32 and pixels hit between them (tests/render/renderer_test.cpp).
 constexpr double kRoundingPart = 1.001, kRoundingPixels = 0.01;
 
+constexpr int kDirections[] = {4, 8, 16, 32};
+
 struct FrameKnob {
   std::string knob, value;
   double pixel_error;
   bool published = false;
+  SceneEffects effects = {};
 };
+
+std::vector<FrameKnob> all_knobs() {
+  std::vector<FrameKnob> all;
+  for (const double pixels : kFrameErrors) all.push_back({"frame", fmt::format("{:g}", pixels), pixels});
+  for (const bool published : {false, true})
+    all.push_back({"tessellation", published ? "published" : "conservative", kTessellated, published});
+  all.push_back({"sky_directions", "no sky light", kTessellated});
+  for (const int n : kDirections) {
+    all.push_back({"sky_directions", std::to_string(n), kTessellated});
+    all.back().effects.sky = effects::Sky{.directions = n};
+  }
+  return all;
+}
 
 class Frames {
  public:
@@ -31,29 +48,33 @@ class Frames {
         scene_(scene),
         best_(db, extract(db, {.error = 0}).patches, {.smoothness = scene.smoothness}) {}
 
-  CostRow measure(const FrameKnob& k, int runs) const {
+  // What a frame shows and keeps to.
+  CostRow facts(const FrameKnob& k) const {
     CostRow row{.knob = k.knob, .value = k.value, .unit = "px", .asked = k.pixel_error};
     row.samples = double(scene_.camera.width) * scene_.camera.height, row.file_bytes = db_.file_bytes();
-    for (int r = 0; r <= runs; ++r) {
-      Renderer renderer(device_, db_,
-                        {.width = scene_.camera.width,
-                         .height = scene_.camera.height,
-                         .pixel_error = k.pixel_error,
-                         .smoothness = scene_.smoothness,
-                         .memory = scene_.memory,
-                         .published = k.published});
-      const FrameStats s = renderer.draw(scene_.camera);
-      if (r == 0) judge(renderer, s, k.published, row);
-      if (r > 0) add(s, row.ms);
-    }
+    Renderer renderer = renderer_of(k);
+    const FrameStats s = renderer.draw(scene_.camera);
+    judge(renderer, s, k.published, row);
     return row;
   }
+  void once(const FrameKnob& k, Stages& ms) const { add(renderer_of(k).draw(scene_.camera), ms); }
 
  private:
+  Renderer renderer_of(const FrameKnob& k) const {
+    return Renderer(device_, db_,
+                    {.width = scene_.camera.width,
+                     .height = scene_.camera.height,
+                     .pixel_error = k.pixel_error,
+                     .smoothness = scene_.smoothness,
+                     .memory = scene_.memory,
+                     .published = k.published,
+                     .effects = k.effects});
+  }
+
   static void add(const FrameStats& s, Stages& ms) {
     ms.query.push_back(s.select_ms + s.extract_ms), ms.fetch.push_back(s.send_ms);
     ms.blend.push_back(s.blend_ms), ms.tessellate.push_back(s.finish_ms + s.factors_ms);
-    ms.draw.push_back(s.draw_ms);
+    ms.draw.push_back(s.draw_ms), ms.light.push_back(s.light_ms);
   }
 
   // Vertical distance of what each pixel shows to the best surface there, as it is seen, in pixels.
@@ -88,7 +109,7 @@ class Frames {
 
   const Database& db_;
   std::shared_ptr<Device> device_;
-  const FrameScene& scene_;
+  FrameScene scene_;
   Blend best_;
 };
 
@@ -110,16 +131,13 @@ FrameScene frame_scene(const Database& db, const Extent& e, const std::string& f
   return f;
 }
 
-std::vector<CostRow> measure_frames(const Database& db, std::shared_ptr<Device> device,
-                                    const FrameScene& scene, int runs) {
-  const Frames frames(db, std::move(device), scene);
-  std::vector<CostRow> rows;
-  for (const double pixels : kFrameErrors)
-    rows.push_back(frames.measure({"frame", fmt::format("{:g}", pixels), pixels}, runs));
-  for (const bool published : {false, true})
-    rows.push_back(frames.measure(
-        {"tessellation", published ? "published" : "conservative", kTessellated, published}, runs));
-  return rows;
+std::vector<Measurable> frame_settings(const Database& db, std::shared_ptr<Device> device,
+                                       const FrameScene& scene) {
+  const auto frames = std::make_shared<const Frames>(db, std::move(device), scene);
+  std::vector<Measurable> all;
+  for (const FrameKnob& k : all_knobs())
+    all.push_back({frames->facts(k), [frames, k](Stages& ms) { frames->once(k, ms); }});
+  return all;
 }
 
 }  // namespace patchwork::cli

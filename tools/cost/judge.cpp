@@ -39,8 +39,10 @@ std::vector<Column> columns(int side) {
 
 }  // namespace
 
-std::vector<double> Stages::total() const { return sum({&query, &fetch, &blend, &tessellate, &draw}); }
-std::vector<double> Stages::at_hand() const { return sum({&query, &blend, &tessellate, &draw}); }
+std::vector<double> Stages::total() const {
+  return sum({&query, &fetch, &blend, &tessellate, &draw, &light});
+}
+std::vector<double> Stages::at_hand() const { return sum({&query, &blend, &tessellate, &draw, &light}); }
 
 double median(const std::vector<double>& values) { return Spread::of(values).median; }
 

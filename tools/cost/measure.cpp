@@ -1,5 +1,4 @@
-// The knobs of `patchwork cost`, one at a time, each setting in turn: A B C A B C, so that what disturbs the
-// machine disturbs all.
+// The knobs of `patchwork cost`, one at a time.
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
@@ -18,8 +17,10 @@ namespace patchwork::cli {
 
 namespace {
 
-constexpr int kSteps = 15;  // of the ladder of errors, 0 among them
-constexpr int kMiddle = 7;  // the step at which the other knobs are turned
+constexpr double kGathering = 0.3;   // about this part of the work is done before times are taken
+constexpr int kAboutSettings = 160;  // uniform grids included
+constexpr int kSteps = 15;           // of the ladder of errors, 0 among them
+constexpr int kMiddle = 7;           // the step at which the other knobs are turned
 constexpr double kPixelErrors[] = {0.5, 1, 2, 4, 8, 16, 32, 50};
 constexpr double kTolerances[] = {0, 0.01, 0.1, 1};  // metres
 constexpr int kTiles[] = {17, 33, 65, 129};          // vertices along each side
@@ -67,12 +68,13 @@ class Bench {
           fmt::format("the uniform grid has a step of {:.4g} m: the finest of the grids "
                       "would take more than {} samples along a side",
                       grid_->step(), UniformGrid::kMostSide));
-    for (const int side : {o_.side, o_.side / 2, o_.side / 8}) errors(side), bar_.show(0.1);
-    pixel_errors(), bar_.show(0.4);
-    blends(), engines(), bar_.show(0.6);
-    sides(), thread_counts(), bar_.show(0.7);
-    uniform_grid(), frames(), bar_.show(0.8);
-    tolerances(), bar_.show(1);
+    for (const int side : {o_.side, o_.side / 2, o_.side / 8}) errors(side);
+    pixel_errors(), blends(), engines(), sides(), thread_counts();
+    uniform_grid(), frames(), tolerances();
+    const auto until = start_ + std::chrono::round<std::chrono::steady_clock::duration>(
+                                    std::chrono::duration<double>(o_.seconds));
+    measure(all_, o_.runs, until, [&](double share) { bar_.show(kGathering + (1 - kGathering) * share); });
+    for (Measurable& m : all_) report_.rows.push_back(std::move(m.row));
     return std::move(report_);
   }
 
@@ -190,14 +192,11 @@ class Bench {
     ms.blend.push_back(1e3 * seconds_since(blending));
   }
 
-  void measure(const std::vector<Setting>& settings) {
-    const std::size_t first = report_.rows.size();
-    for (const Setting& s : settings) report_.rows.push_back(facts(s));
-    for (int r = 0; r <= o_.runs; ++r)
-      for (std::size_t k = 0; k < settings.size(); ++k) {
-        Stages warming;
-        once(settings[k], r > 0 ? report_.rows[first + k].ms : warming);
-      }
+  void add(const std::vector<Setting>& settings) {
+    for (const Setting& s : settings) {
+      all_.push_back({facts(s), [this, s](Stages& ms) { once(s, ms); }});
+      bar_.show(std::min(kGathering, kGathering * double(all_.size()) / kAboutSettings));
+    }
   }
 
   void errors(int side) {
@@ -207,7 +206,7 @@ class Bench {
                             fmt::format("{:.4g}", error), error));
       all.back().side = side;
     }
-    measure(all);
+    add(all);
   }
 
   ViewCut view() const {
@@ -220,9 +219,8 @@ class Bench {
   void frames() {
     if (!device_) return;
     try {
-      for (CostRow& row :
-           measure_frames(db_, device_, frame_scene(db_, extent_, o_.scene, common_.memory), o_.runs))
-        report_.rows.push_back(std::move(row));
+      const FrameScene scene = frame_scene(db_, extent_, o_.scene, common_.memory);
+      for (Measurable& m : frame_settings(db_, device_, scene)) all_.push_back(std::move(m));
     } catch (const Error& e) {
       report_.notes.push_back(fmt::format("no frame was drawn: {}", e.what()));
     }
@@ -269,7 +267,7 @@ class Bench {
       s.unit = "px", s.cut = make_surface(v), s.window = window_, s.scale = scale_;
       all.push_back(s);
     }
-    measure(all);
+    add(all);
   }
 
   void blends() {
@@ -284,7 +282,7 @@ class Bench {
       all.back().comparable = !weighted;
       if (weighted) all.back().blend.composition = Composition::weighted;
     }
-    measure(all);
+    add(all);
   }
 
   void engines() {
@@ -297,7 +295,7 @@ class Bench {
         all.back().vulkan = true, all.back().comparable = false, all.back().tile = tile;
       }
     }
-    measure(all);
+    add(all);
   }
 
   void sides() {
@@ -306,7 +304,7 @@ class Bench {
       all.push_back(setting("side", std::to_string(side)));
       all.back().side = side;
     }
-    measure(all);
+    add(all);
   }
 
   void thread_counts() {
@@ -315,7 +313,7 @@ class Bench {
       all.push_back(setting("threads", std::to_string(n)));
       all.back().threads = n, all.back().comparable = n == threads();
     }
-    measure(all);
+    add(all);
   }
 
   // The grids stored again, to within a tolerance.
@@ -329,14 +327,13 @@ class Bench {
     }
     for (const Grid& g : db_.grids())
       write_samples(db_, g.info, folder_.path(std::to_string(g.info.id.value) + ".tif"), {});
-    std::vector<Database> stored;
-    for (const double tolerance : kTolerances) stored.push_back(store_again(tolerance));
+    for (const double tolerance : kTolerances) stored_.push_back(store_again(tolerance));
     std::vector<Setting> all;
-    for (std::size_t k = 0; k < stored.size(); ++k) {
+    for (std::size_t k = 0; k < stored_.size(); ++k) {
       all.push_back(setting("tolerance", fmt::format("{:g}", kTolerances[k])));
-      all.back().db = &stored[k], all.back().comparable = false;
+      all.back().db = &stored_[k], all.back().comparable = false;
     }
-    measure(all);
+    add(all);
   }
 
   Database store_again(double tolerance) const {
@@ -363,11 +360,9 @@ class Bench {
       CostRow row{.knob = knob, .value = fmt::format("1:{}", grid_->factor(level)), .unit = unit};
       row.error = grid_->error(level, scale), row.samples = double(side) * side;
       row.bytes = grid_->bytes(level), row.file_bytes = grid_->file_bytes();
-      for (int r = 0; r <= o_.runs; ++r) {
-        const double ms = grid_->read(level, window, side);
-        if (r > 0) row.ms.fetch.push_back(ms);
-      }
-      report_.rows.push_back(std::move(row));
+      all_.push_back({std::move(row), [this, level, window, side](Stages& ms) {
+                        ms.fetch.push_back(grid_->read(level, window, side));
+                      }});
     }
   }
 
@@ -376,12 +371,15 @@ class Bench {
   WorkFolder folder_;
   Database db_;
   ProgressBar bar_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   Extent extent_{}, window_{};  // window_: of the view
   std::uint64_t memory_ = 0;
   std::unique_ptr<CheckPoints> points_;
   std::unique_ptr<UniformGrid> grid_;
   std::shared_ptr<Device> device_;
   std::vector<double> ladder_, scale_;
+  std::vector<Database> stored_;  // again, to within the tolerances
+  std::vector<Measurable> all_;
   CostReport report_;
 };
 

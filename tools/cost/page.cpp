@@ -56,6 +56,7 @@ constexpr Section kSections[] = {
      "The uniform grid is only read."},
     {"tessellation", "Tessellation",
      "Conservative factors keep to the error that is asked for; the published ones do not promise it."},
+    {"sky_directions", "Sky light", "Directions in which each place of a frame looks for the sky."},
     {"side", "Size of the picture", "At the middle of the ladder; both axes are logarithmic."},
     {"smoothness", "Smoothness", "k continuous derivatives: bilinear, bicubic, bicubic spline."},
     {"blend", "Blend", "priority keeps to the bound that was asked for; weighted is the published formula."},
@@ -101,16 +102,16 @@ std::string table_of_rows(const CostReport& c) {
     return e ? figure(*e) + " " + unit : "";
   };
   std::string t =
-      "<div class=\"wide\"><table>" +
-      table_row({"knob", "value", "asked", "guaranteed", "measured", "99 %", "rms", "patches", "MB",
-                 "query ms", "fetch ms", "blend ms", "tessellate ms", "draw ms", "total ms"},
-                "th");
+      "<div class=\"wide\"><table>" + table_row({"knob", "value", "asked", "guaranteed", "measured", "99 %",
+                                                 "rms", "patches", "MB", "query ms", "fetch ms", "blend ms",
+                                                 "tessellate ms", "light ms", "draw ms", "total ms", "runs"},
+                                                "th");
   for (const CostRow& r : c.rows)
     t += table_row(
         {r.knob, r.value, error(r.asked, r.unit), error(r.bound, r.unit), error(r.error.max, r.unit),
          figure(r.error.p99), figure(r.error.rms), std::to_string(r.patches), figure(double(r.bytes) / 1e6),
-         stage(r.ms.query), stage(r.ms.fetch), stage(r.ms.blend), stage(r.ms.tessellate), stage(r.ms.draw),
-         stage(r.ms.total())},
+         stage(r.ms.query), stage(r.ms.fetch), stage(r.ms.blend), stage(r.ms.tessellate), stage(r.ms.light),
+         stage(r.ms.draw), stage(r.ms.total()), std::to_string(r.ms.total().size())},
         "td");
   return t + "</table></div>\n";
 }
@@ -139,10 +140,10 @@ std::string inlined(const std::string& svg) { return svg.substr(svg.find("<svg")
 std::string cost_page(const CostReport& c, const std::vector<std::pair<std::string, std::string>>& plots) {
   std::string page = kHead;
   page += "<h1>What accuracy costs in time</h1>\n";
-  page += fmt::format("<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of {} runs.</p>\n",
-                      c.side, c.side, figure((c.extent.xmax - c.extent.xmin) / 1e3),
-                      figure((c.extent.ymax - c.extent.ymin) / 1e3), escaped(c.machine), c.threads,
-                      c.engine.empty() ? "" : ", graphics card " + escaped(c.engine), c.runs);
+  page += fmt::format(
+      "<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of {} runs or more.</p>\n", c.side,
+      c.side, figure((c.extent.xmax - c.extent.xmin) / 1e3), figure((c.extent.ymax - c.extent.ymin) / 1e3),
+      escaped(c.machine), c.threads, c.engine.empty() ? "" : ", graphics card " + escaped(c.engine), c.runs);
   page += verdict(c);
   for (const std::string& n : c.notes) page += "<p>Note: " + escaped(n) + ".</p>\n";
   page +=

@@ -26,6 +26,7 @@ set style line 4 lc rgb "#777777" lw 2 dt 2 pt 4 ps 0.7
 set style line 5 lc rgb "#E69F00" lw 2 pt 11 ps 0.7
 set style line 6 lc rgb "#000000" lw 2 pt 6 ps 1.6
 set style line 7 lc rgb "#CC79A7" lw 2 pt 7 ps 0.6
+set style line 8 lc rgb "#56B4E9" lw 2 pt 13 ps 0.6
 set style arrow 1 heads size screen 0.005,90 lc rgb "#000000" lw 1.5
 set key outside right top vertical Left reverse samplen 2 spacing 1.3 width -2
 set format "%g"
@@ -167,8 +168,8 @@ std::string equal(const CostReport& c, const CostRow& row) {
   return found;
 }
 
-// Columns: place, label, query, fetch, blend, tessellate, draw, total median min max, uniform grid median min
-// max.
+// Columns: place, label, query, fetch, blend, tessellate, light, draw, total median min max, uniform grid
+// median min max.
 std::vector<std::string> columns(const CostReport& c, const std::string& knob, bool with_bound) {
   std::vector<std::string> all;
   const auto stage = [](const std::vector<double>& ms) { return ms.empty() ? 0 : median(ms); };
@@ -176,9 +177,9 @@ std::vector<std::string> columns(const CostReport& c, const std::string& knob, b
     const CostRow& r = c.rows[k];
     const std::string bound = r.bound ? fmt::format("≤ {} {}", figure(guaranteed(r)), r.unit)
                                       : fmt::format("measured {} {}", figure(r.error.max), r.unit);
-    all.push_back(fmt::format("{} \"{}{}\" {} {} {} {} {} {} {}", all.size(), r.value,
+    all.push_back(fmt::format("{} \"{}{}\" {} {} {} {} {} {} {} {}", all.size(), r.value,
                               with_bound ? "\\n" + bound : "", stage(r.ms.query), stage(r.ms.fetch),
-                              stage(r.ms.blend), stage(r.ms.tessellate), stage(r.ms.draw),
+                              stage(r.ms.blend), stage(r.ms.tessellate), stage(r.ms.light), stage(r.ms.draw),
                               spread(r.ms.total()), equal(c, r)));
   }
   return all;
@@ -191,12 +192,13 @@ std::string bars(std::size_t n, bool two_lines) {
 }
 
 // Boxes of the sums of stages, the largest first, each times `factor`.
-std::string stack(bool pictures, const std::string& factor) {
+std::string stack(bool pictures, bool lit, const std::string& factor) {
   const auto boxes = [&](const std::string& sum, int style, const std::string& name) {
     return fmt::format("$data u 1:(({}){}):xtic(2) w boxes ls {} t '{}', ", sum, factor, style, name);
   };
-  const std::string drawn =
-      pictures ? boxes("$3+$4+$5+$6+$7", 2, "draw") + boxes("$3+$4+$5+$6", 7, "tessellate") : "";
+  std::string drawn = pictures ? boxes("$3+$4+$5+$6+$7+$8", 2, "draw") : "";
+  if (lit) drawn += boxes("$3+$4+$5+$6+$7", 8, "light");
+  if (pictures) drawn += boxes("$3+$4+$5+$6", 7, "tessellate");
   return "plot " + drawn + boxes("$3+$4+$5", 1, "blend") + boxes("$3+$4", 3, "fetch, decode") +
          boxes("$3", 5, "query");
 }
@@ -210,9 +212,9 @@ void stacked(Script& s, const CostReport& c, const std::string& knob, const std:
   s.picture(ladder ? "stages" : knob,
             axes(x, "time, ms", "") + bars(data.size(), !ladder) + "set yrange [0:*]\n" +
                 (ladder ? "set xtics rotate by -45\n" : ""),
-            stack(pictures, "") +
-                "$data u 1:9:(0):($10-$9) w vectors as 1 t 'total, least to most', "
-                "$data u 1:11:12:13 w yerrorbars ls 4 dt 1 t 'uniform grid, equal error'");
+            stack(pictures, knob == "sky_directions", "") +
+                "$data u 1:10:(0):($11-$10) w vectors as 1 t 'total, least to most', "
+                "$data u 1:12:13:14 w yerrorbars ls 4 dt 1 t 'uniform grid, equal error'");
 }
 
 void shares(Script& s, const CostReport& c) {
@@ -221,7 +223,7 @@ void shares(Script& s, const CostReport& c) {
   s.picture("shares",
             axes("error asked for, metres", "part of the time, %", "") + bars(data.size(), false) +
                 "set yrange [0:100]\nset xtics rotate by -45\n",
-            stack(false, "*100/($3+$4+$5)") + "NaN notitle");
+            stack(false, false, "*100/($3+$4+$5)") + "NaN notitle");
 }
 
 void sides(Script& s, const CostReport& c) {
@@ -265,6 +267,7 @@ std::vector<std::pair<std::string, std::string>> draw_cost(const CostReport& rep
   pixels(s, report), sides(s, report);
   stacked(s, report, "frame", "error on the screen asked for, pixels");
   stacked(s, report, "tessellation", "tessellation");
+  stacked(s, report, "sky_directions", "directions of sky light");
   stacked(s, report, "smoothness", "smoothness k"), stacked(s, report, "blend", "blend");
   stacked(s, report, "engine", "engine"), stacked(s, report, "tile", "vertices along a side of a tile");
   stacked(s, report, "threads", "threads"), stacked(s, report, "tolerance", "storage tolerance, metres");

@@ -67,6 +67,11 @@ void FlyCamera::zoom(double notches) {
   fov_degrees_ = std::clamp(fov_degrees_ * std::pow(0.9, notches), kNarrowest, kWidest);
 }
 
+void FlyCamera::keep_above(double height) {
+  if (eye_.z >= height) return;
+  eye_.z = height, velocity_.z = std::max(velocity_.z, 0.0);
+}
+
 Camera FlyCamera::camera(int width, int height) const {
   return {point(eye_), point(eye_ + reach_ * forward()), fov_degrees_, width, height};
 }

@@ -33,6 +33,8 @@ class FlyCamera {
   /// Notches of a wheel: a fifth faster each, or a tenth narrower.
   void change_speed(double notches);
   void zoom(double notches);
+  /// Lifts the eye where it is lower than `height`, metres; it sinks no more then.
+  void keep_above(double height);
 
   Camera camera(int width, int height) const;
   Point3 eye() const { return point(eye_); }

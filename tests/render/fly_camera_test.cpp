@@ -124,6 +124,23 @@ TEST(FlyCamera, NeverTurnsOver) {
   EXPECT_GT(axes(f.camera(10, 10)).up.z, 0);
 }
 
+TEST(FlyCamera, StaysAboveTheGroundAndGlidesAlongIt) {
+  FlyCamera free({{0, 0, 100}, {0, 1000, -900}, 60, 10, 10}, 50), kept = free;
+  const auto ground = [](double y) { return 20 + 10 * std::sin(y / 30); };
+  double lowest = INFINITY;
+  for (int n = 0; n < 600; ++n) {
+    free.step({.forward = 1}, 0.02), kept.step({.forward = 1}, 0.02);
+    kept.keep_above(ground(kept.eye().y) + 2);
+    lowest = std::min(lowest, kept.eye().z - ground(kept.eye().y));
+  }
+  EXPECT_NEAR(lowest, 2, 1e-9);
+  EXPECT_LT(free.eye().z, 0) << "the control";
+  EXPECT_NEAR(kept.eye().y, free.eye().y, 1e-6) << "the way in the plane is the same";
+  const Point3 before = kept.eye();
+  kept.keep_above(-1000);
+  EXPECT_EQ(kept.eye().z, before.z);
+}
+
 TEST(FlyCamera, ZoomKeepsToItsLimits) {
   FlyCamera f(kNorth, 1);
   f.zoom(1);

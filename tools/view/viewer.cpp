@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <glm/geometric.hpp>
+#include <optional>
 
+#include "query/extract.h"
+#include "render/tile_cut.h"
 #include "tools/cli.h"
 #include "tools/scene_setup.h"
 
@@ -18,6 +22,7 @@ constexpr double kFetchWait = 0.004;   // while tiles are being fetched
 constexpr double kPanelPeriod = 0.25;  // seconds that figures stay readable
 constexpr double kLongestStep = 1;     // seconds: a hitch does not throw the camera away
 constexpr double kFirstStep = 1.0 / 60;
+constexpr double kClearance = 2;  // metres between the eye that flies and the ground, known to half of it
 constexpr double kFinest = 0.25, kCoarsest = 64;  // pixels of error
 
 const Rows kKeys{{"W  S", "forward, back"},
@@ -59,6 +64,16 @@ std::vector<std::array<Point, 4>> outlines(const Database& db) {
     all.push_back({at(r.i0, r.j0), at(r.i1, r.j0), at(r.i1, r.j1), at(r.i0, r.j1)});
   }
   return all;
+}
+
+// Metres; nothing where there is no data.
+std::optional<double> ground_below(const Database& db, const Point3& eye, const Scene& scene) {
+  const double x[] = {eye.x}, y[] = {eye.y};
+  const Extent here{eye.x, eye.y, eye.x, eye.y};
+  const Extraction found = extract(db, TileCut(0.5 * kClearance, {here}));
+  double height = NAN;
+  Blend(db, found.patches, {.smoothness = scene.smoothness}).at_points(x, y, {{&height, 1}, {}, {}, {}});
+  return std::isnan(height) ? std::nullopt : std::optional(height);
 }
 
 Json json_of(const Point3& p) { return {p.x, p.y, p.z}; }
@@ -146,6 +161,8 @@ void Viewer::steer(const WindowInput& input) {
   fly_.change_speed(input.speed), fly_.zoom(input.zoom);
   fly_.step(input.steering, std::min(passed, moves_ ? kLongestStep : kFirstStep));
   moves_ = fly_.moves() || !input.idle();
+  if (fly_.moves())
+    if (const auto ground = ground_below(db_, fly_.eye(), scene_)) fly_.keep_above(*ground + kClearance);
 }
 
 bool Viewer::lay_panels() {

@@ -21,10 +21,10 @@ constexpr int kWidth = 640, kHeight = 360;
 constexpr double kPixelError = 2;
 constexpr int kPolicyFrames = 120;
 constexpr double kEnough = 0.99;  // share of tiles at the asked error
-constexpr double kFlightSeconds = 3, kSettleSeconds = 0.5,
-                 kFirstSeconds = 4;  // before the first: all is read
-constexpr double kSlowest = 50;      // metres a second; doubled while it goes well
-constexpr int kDoublings = 10;
+constexpr double kFlightSeconds = 2.5, kSettleSeconds = 0.5;
+constexpr double kFirstSeconds = 3;  // until all is read
+constexpr double kSlowest = 100;     // metres a second; doubled while it goes well
+constexpr int kDoublings = 9;
 
 using Clock = std::chrono::steady_clock;
 

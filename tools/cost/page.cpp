@@ -56,7 +56,9 @@ constexpr Section kSections[] = {
      "The uniform grid is only read."},
     {"tessellation", "Tessellation",
      "Conservative factors keep to the error that is asked for; the published ones do not promise it."},
-    {"sky_directions", "Sky light", "Directions in which each place of a frame looks for the sky."},
+    {"sky_directions", "Sky light",
+     "Directions in which each place looks for the sky, in a map over the terrain that later frames keep. "
+     "Rest: what no other stage of the frame takes."},
     {"side", "Size of the picture", "At the middle of the ladder; both axes are logarithmic."},
     {"smoothness", "Smoothness", "k continuous derivatives: bilinear, bicubic, bicubic spline."},
     {"blend", "Blend", "priority keeps to the bound that was asked for; weighted is the published formula."},

@@ -197,7 +197,7 @@ std::string stack(bool pictures, bool lit, const std::string& factor) {
     return fmt::format("$data u 1:(({}){}):xtic(2) w boxes ls {} t '{}', ", sum, factor, style, name);
   };
   std::string drawn = pictures ? boxes("$3+$4+$5+$6+$7+$8", 2, "draw") : "";
-  if (lit) drawn += boxes("$3+$4+$5+$6+$7", 8, "light");
+  if (lit) drawn += boxes("$3+$4+$5+$6+$7", 8, "light, rest");
   if (pictures) drawn += boxes("$3+$4+$5+$6", 7, "tessellate");
   return "plot " + drawn + boxes("$3+$4+$5", 1, "blend") + boxes("$3+$4", 3, "fetch, decode") +
          boxes("$3", 5, "query");

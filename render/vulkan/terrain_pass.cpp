@@ -55,8 +55,7 @@ OwnedPipeline sky_pipeline(const Bindings& bindings, VkRenderPass pass, const Fr
 
 TerrainPass::TerrainPass(const Device::Impl& device, const TileStore& store, VkRenderPass pass,
                          std::uint32_t most_tiles)
-    : device_(device),
-      store_(store),
+    : store_(store),
       pass_(pass),
       factor_bindings_(device, kFactorTypes, 0),
       bindings_(device, kTypes, 0, kStages),

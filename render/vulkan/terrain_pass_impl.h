@@ -48,7 +48,6 @@ class TerrainPass {
   };
   Pipelines make_pipelines(const FrameEffects& effects) const;
   void bind_all(const TileStore& store);
-  const Device::Impl& device_;
   const TileStore& store_;
   VkRenderPass pass_;
   Bindings factor_bindings_, bindings_;  // of the dispatches; of the draws

@@ -22,4 +22,12 @@ inline void report_law(const char* name, const std::string& what, std::uint64_t 
   report_case(name, what, tries, testing::Test::HasFailure() ? 1 : 0, 0, "broken");
 }
 
+/// Prints a line for the naive form beside a case, and fails where that keeps the case's limit.
+inline void report_control(const char* name, const std::string& what, std::uint64_t tries, double worst,
+                           double limit, const char* unit) {
+  std::printf("HARD CASE | %s | negative control: %s | %llu | %.3g | %.3g | %s\n", name, what.c_str(),
+              static_cast<unsigned long long>(tries), worst, limit, unit);
+  EXPECT_GT(worst, limit) << name << ": " << what;
+}
+
 }  // namespace patchwork

@@ -293,15 +293,18 @@ TEST(TileSelection, WhatAChangeTouchesIsWantedBehindWhatIsMissing) {
 // ---------------------------------------------------------------------------------------------------
 
 // terrain.glsl in C++: the texel of a border position, and where in the lattice it lies.
+std::uint32_t half_texel(const TileDraw& d, int s, int t) {
+  const TileDraw::Side& side = d.sides[std::size_t(s)];
+  const std::uint32_t later = t > 64, past = std::uint32_t(t) - 64 * later;
+  return (later ? side.far : side.near) + (side.fine >> later & 1 ? past : past / 2) * side.step;
+}
+
 std::uint32_t seam_texel(const TileDraw& d, int s, int t) {
   if (t == 0 || t == 128) {
     const int along = t == 0 ? 0 : 1;
     return d.corners[std::size_t(s < 2 ? s + 2 * along : along + 2 * (s - 2))];
   }
-  const TileDraw::Side& side = d.sides[std::size_t(s)];
-  if (t == 64) return d.middles[std::size_t(s)];
-  const std::uint32_t later = t > 64, past = std::uint32_t(t) - 64 * later;
-  return (later ? side.far : side.near) + (side.fine >> later & 1 ? past : past / 2) * side.step;
+  return t == 64 ? d.middles[std::size_t(s)] : half_texel(d, s, t);
 }
 
 std::pair<std::int64_t, std::int64_t> place_of(const TileDraw& d, int s, int t) {
@@ -311,7 +314,7 @@ std::pair<std::int64_t, std::int64_t> place_of(const TileDraw& d, int s, int t) 
 
 TEST(EdgeSplit, WhoeverSharesAVertexReadsTheSameTexel) {
   const std::uint64_t seed = test_seed(11);
-  int shared = 0, finer = 0;
+  int shared = 0, finer = 0, apart = 0;
   for (std::uint64_t n = 0; n < 40; ++n) {
     Woods woods(seed + n);
     const Camera camera = woods.camera();
@@ -320,7 +323,7 @@ TEST(EdgeSplit, WhoeverSharesAVertexReadsTheSameTexel) {
     std::vector<TileDraw> draws;
     make_draws(woods.lattice(), s, woods.cache, {camera.eye.x, camera.eye.y}, draws);
     ASSERT_EQ(draws.size(), s.drawn.size());
-    std::map<std::pair<std::int64_t, std::int64_t>, std::uint32_t> texel_at;
+    std::map<std::pair<std::int64_t, std::int64_t>, std::uint32_t> texel_at, half_texel_at;
     for (const TileDraw& d : draws)
       for (int side = 0; side < 4; ++side)
         for (int t = 0; t <= 128; ++t) {
@@ -330,20 +333,27 @@ TEST(EdgeSplit, WhoeverSharesAVertexReadsTheSameTexel) {
           const auto [at, is_new] = texel_at.try_emplace(place_of(d, side, t), seam_texel(d, side, t));
           ASSERT_EQ(at->second, seam_texel(d, side, t)) << "side " << side << " position " << t;
           shared += !is_new;
+          const std::uint32_t own = half_texel(d, side, t);
+          apart += half_texel_at.try_emplace(place_of(d, side, t), own).first->second != own;
         }
   }
   EXPECT_GT(shared, 10000);
   EXPECT_GT(finer, 1000) << "levels meet";
   report_law("EdgeSplit", "whoever shares a vertex reads the same texel", std::uint64_t(shared));
+  report_control("EdgeSplit", "halves of seams read their ends themselves", std::uint64_t(shared), apart, 0,
+                 "vertices");
+}
+
+// What a block at a border needs, whoever lies beyond.
+int own_need(const std::vector<std::array<int, 64>>& need, std::size_t d, int side, int along) {
+  const int end = (side & 1) * 7;
+  return need[d][std::size_t(side < 2 ? along * 8 + end : end * 8 + along)];
 }
 
 // edges.comp in C++: the segments of each border edge, in the terms of its tile, from what blocks need.
 int border_need(const std::vector<TileDraw>& draws, const std::vector<std::array<int, 64>>& need,
                 std::size_t d, int s, int along) {
-  const auto at = [&](std::size_t draw, int side, int k) {
-    const int end = (side & 1) * 7;
-    return need[draw][std::size_t(side < 2 ? k * 8 + end : end * 8 + k)];
-  };
+  const auto at = [&](std::size_t draw, int side, int k) { return own_need(need, draw, side, k); };
   const int own = at(d, s, along);
   const std::uint32_t other = (along < 4 ? draws[d].beside_near : draws[d].beside_far)[std::size_t(s)];
   if (other == TileDraw::kAlone) return own;
@@ -361,7 +371,7 @@ int border_need(const std::vector<TileDraw>& draws, const std::vector<std::array
 
 TEST(EdgeSplit, EverySharedEdgeIsSplitAtTheSamePlaces) {
   const std::uint64_t seed = test_seed(13);
-  std::size_t edges = 0;
+  std::size_t edges = 0, split_apart = 0;
   for (std::uint64_t n = 0; n < 40; ++n) {
     Woods woods(seed + n);
     const Camera camera = woods.camera();
@@ -375,23 +385,28 @@ TEST(EdgeSplit, EverySharedEdgeIsSplitAtTheSamePlaces) {
       for (int& b : tile) b = 1 << random() % 4;
     // Segments of shared lines: each must be there twice, from either side.
     using Place = std::pair<std::int64_t, std::int64_t>;
-    std::map<std::pair<Place, Place>, int> segments;
+    std::map<std::pair<Place, Place>, int> segments, by_own_need;
     for (std::size_t d = 0; d < draws.size(); ++d)
       for (int side = 0; side < 4; ++side)
         for (int along = 0; along < 8; ++along) {
           const std::uint32_t other =
               (along < 4 ? draws[d].beside_near : draws[d].beside_far)[std::size_t(side)];
           if (other == TileDraw::kAlone) continue;
-          const int parts = border_need(draws, need, d, side, along);
-          for (int k = 0; k < parts; ++k)
-            ++segments[{place_of(draws[d], side, 16 * along + 16 * k / parts),
-                        place_of(draws[d], side, 16 * along + 16 * (k + 1) / parts)}];
+          const auto split = [&](int parts, auto& into) {
+            for (int k = 0; k < parts; ++k)
+              ++into[{place_of(draws[d], side, 16 * along + 16 * k / parts),
+                      place_of(draws[d], side, 16 * along + 16 * (k + 1) / parts)}];
+          };
+          split(border_need(draws, need, d, side, along), segments);
+          split(own_need(need, d, side, along), by_own_need);
         }
     for (const auto& [segment, times] : segments) ASSERT_EQ(times, 2);
     edges += segments.size();
+    for (const auto& [segment, times] : by_own_need) split_apart += times != 2;
   }
   EXPECT_GT(edges, 10000u);
   report_law("EdgeSplit", "both sides split a shared edge at the same places", edges);
+  report_control("EdgeSplit", "each side splits by its own need", edges, double(split_apart), 0, "edges");
 }
 
 }  // namespace

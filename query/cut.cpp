@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -56,9 +57,18 @@ std::vector<Point> convex_hull(std::vector<Point> points) {
   return hull;
 }
 
-// A side of a convex region: inside are the points with nx x + ny y <= most.
-struct Side {
-  double nx, ny, most;
+// Eight sides of a convex region: inside are the points with nx x + ny y <= most. What is positive of a
+// normal stands apart from what is negative, so that a box's innermost and outermost corner need no choice.
+struct Sides {
+  static constexpr std::size_t kCount = 8;
+  double nx_up[kCount] = {}, nx_down[kCount] = {}, ny_up[kCount] = {}, ny_down[kCount] = {};
+  double most[kCount], nearly[kCount];  // nearly: with a hair of slack
+
+  Sides() { std::fill_n(most, kCount, INFINITY), std::fill_n(nearly, kCount, INFINITY); }
+  void set(std::size_t k, double nx, double ny, double limit);
+  bool beyond(std::size_t k, Point p) const {
+    return (nx_up[k] + nx_down[k]) * p.x + (ny_up[k] + ny_down[k]) * p.y > most[k];
+  }
 };
 
 // All slots are compared, in use or not: loops of fixed length become vectors. A hair of slack makes up for
@@ -85,21 +95,30 @@ PATCHWORK_VECTORIZED void near_enough(const LodPage& page, Point eye, double hei
   }
 }
 
-// Of the hits those with a corner on the inner side.
-PATCHWORK_VECTORIZED void keep_inside(const LodPage& page, Side side, std::uint8_t* __restrict hit) {
-  const double* const px = side.nx > 0 ? page.xmin : page.xmax;
-  const double* const py = side.ny > 0 ? page.ymin : page.ymax;
-  const double most = side.most + kHair * std::abs(side.most);
-  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s)
-    hit[s] = std::uint8_t(hit[s] & (side.nx * px[s] + side.ny * py[s] <= most));
+void Sides::set(std::size_t k, double nx, double ny, double limit) {
+  nx_up[k] = std::max(nx, 0.0), nx_down[k] = std::min(nx, 0.0);
+  ny_up[k] = std::max(ny, 0.0), ny_down[k] = std::min(ny, 0.0);
+  most[k] = limit, nearly[k] = limit + kHair * std::abs(limit);
 }
 
-// Of the hits those with all corners on the inner side.
-PATCHWORK_VECTORIZED void keep_whole(const LodPage& page, Side side, std::uint8_t* __restrict hit) {
-  const double* const px = side.nx > 0 ? page.xmax : page.xmin;
-  const double* const py = side.ny > 0 ? page.ymax : page.ymin;
-  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s)
-    hit[s] = std::uint8_t(hit[s] & (side.nx * px[s] + side.ny * py[s] <= side.most));
+// Of the boxes that a page met those that have a corner on the inner side of each side; `inside` are those
+// that have all corners there. Few are left to be asked, so vectors go along the sides.
+PATCHWORK_VECTORIZED void keep_inside(const LodPage& page, const Sides& sides, LodHits& hits) {
+  std::uint64_t out = 0, not_whole = 0;
+  for (std::uint64_t left = hits.met; left; left &= left - 1) {
+    const int s = std::countr_zero(left);
+    const double x0 = page.xmin[s], y0 = page.ymin[s], x1 = page.xmax[s], y1 = page.ymax[s];
+    std::int64_t outside = 0, partly = 0;
+    for (std::size_t k = 0; k < Sides::kCount; ++k) {
+      const double inner =
+          (sides.nx_up[k] * x0 + sides.nx_down[k] * x1) + (sides.ny_up[k] * y0 + sides.ny_down[k] * y1);
+      const double outer =
+          (sides.nx_up[k] * x1 + sides.nx_down[k] * x0) + (sides.ny_up[k] * y1 + sides.ny_down[k] * y0);
+      outside |= std::int64_t{inner > sides.nearly[k]}, partly |= std::int64_t{outer > sides.most[k]};
+    }
+    out |= std::uint64_t(outside) << s, not_whole |= std::uint64_t(partly) << s;
+  }
+  hits.met &= ~out, hits.inside &= ~(out | not_whole);
 }
 
 class ViewSurface : public CutSurface {
@@ -112,7 +131,8 @@ class ViewSurface : public CutSurface {
     for (std::size_t k = 0; corners_.size() >= 3 && k < corners_.size(); ++k) {
       const Point &a = corners_[k], &b = corners_[(k + 1) % corners_.size()];
       const double nx = b.y - a.y, ny = a.x - b.x;  // outward of a counterclockwise polygon
-      sides_.push_back({nx, ny, std::max(nx * a.x + ny * a.y, nx * b.x + ny * b.y)});
+      if (k % Sides::kCount == 0) sides_.emplace_back();
+      sides_.back().set(k % Sides::kCount, nx, ny, std::max(nx * a.x + ny * a.y, nx * b.x + ny * b.y));
       bounds_ = {std::min(bounds_.xmin, a.x), std::min(bounds_.ymin, a.y), std::max(bounds_.xmax, a.x),
                  std::max(bounds_.ymax, a.y)};
     }
@@ -137,10 +157,11 @@ class ViewSurface : public CutSurface {
     const Frame& f = grid.info.frame;
     const Point rect[] = {f.to_domain(d.i0, d.j0), f.to_domain(d.i1, d.j0), f.to_domain(d.i1, d.j1),
                           f.to_domain(d.i0, d.j1)};
-    for (const Side& s : sides_) {
-      const auto beyond = [&](const Point& p) { return s.nx * p.x + s.ny * p.y > s.most; };
-      if (std::all_of(std::begin(rect), std::end(rect), beyond)) return false;
-    }
+    for (const Sides& eight : sides_)
+      for (std::size_t k = 0; k < Sides::kCount; ++k) {
+        const auto beyond = [&](const Point& p) { return eight.beyond(k, p); };
+        if (std::all_of(std::begin(rect), std::end(rect), beyond)) return false;
+      }
     LatticeRect seen{INFINITY, INFINITY, -INFINITY, -INFINITY};
     for (const Point& c : corners_) {
       const Point p = f.to_lattice(c.x, c.y);
@@ -154,13 +175,9 @@ class ViewSurface : public CutSurface {
     std::uint8_t hit[LodPage::kSlots];
     near_enough(page, eye_, above_, slope_ * slope_, bounds_, hit);
     LodHits hits{page.mask_of_used(hit)};
-    if (inside) hits.inside = hits.met;
-    if (inside || hits.met == 0) return hits;
-    for (const Side& side : sides_) keep_inside(page, side, hit);
-    hits.met = page.mask_of_used(hit);
-    if (page.level == 0 || hits.met == 0) return hits;
-    for (const Side& side : sides_) keep_whole(page, side, hit);
-    hits.inside = page.mask_of_used(hit);
+    hits.inside = hits.met;
+    if (inside) return hits;
+    for (const Sides& eight : sides_) keep_inside(page, eight, hits);
     return hits;
   }
 
@@ -170,7 +187,7 @@ class ViewSurface : public CutSurface {
   double slope_;  // metres of tolerance a metre of distance
   std::vector<Point> corners_;
   Extent bounds_{INFINITY, INFINITY, -INFINITY, -INFINITY};  // of the corners
-  std::vector<Side> sides_;
+  std::vector<Sides> sides_;
 };
 
 }  // namespace

@@ -22,6 +22,7 @@ struct Entry {
 constexpr Entry kEntries[] = {{"fixed", &CostModel::fixed},
                               {"page", &CostModel::page},
                               {"patch", &CostModel::patch},
+                              {"beyond", &CostModel::beyond},
                               {"read_fixed", &CostModel::read_fixed},
                               {"read_patch", &CostModel::read_patch},
                               {"blend_fixed", &CostModel::blend_fixed},
@@ -60,7 +61,8 @@ std::array<double, kCounts> solve(const std::vector<Observation>& all) {
 CostModel fit(std::span<const Measured> answers) {
   std::vector<Observation> find, read, blend;
   for (const Measured& m : answers) {
-    if (m.find > 0) find.push_back({{1, m.pages, m.patches, 0}, m.find});
+    if (m.find > 0)
+      find.push_back({{1, m.pages, m.patches, std::max(0.0, m.patches - CostModel::kCached)}, m.find});
     if (m.read > 0) read.push_back({{1, 0, m.patches, 0}, m.read});
     if (m.blend > 0) blend.push_back({{1, m.samples, m.patches, std::sqrt(m.patches * m.samples)}, m.blend});
   }
@@ -68,6 +70,7 @@ CostModel fit(std::span<const Measured> answers) {
   return {.fixed = f[0],
           .page = f[1],
           .patch = f[2],
+          .beyond = f[3],
           .read_fixed = r[0],
           .read_patch = r[2],
           .blend_fixed = b[0],

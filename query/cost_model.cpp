@@ -9,7 +9,7 @@ namespace patchwork {
 
 namespace {
 
-constexpr double kCalibration = 0.1;         // seconds
+constexpr double kCalibration = 0.3;         // seconds
 constexpr double kUsed = 0.9;                // of a time budget, by what is expected
 constexpr double kRung = 1.189207115002721;  // a quarter octave
 constexpr int kRungs = 96;

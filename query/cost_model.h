@@ -1,6 +1,7 @@
 // What an answer will cost, before it is asked for; and the answer that fits into a time.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -16,12 +17,17 @@ namespace patchwork {
 /// are read for it are in memory; reading and decoding patches from the file; evaluating heights on all
 /// cores.
 struct CostModel {
+  /// Of patches beyond this many the records and the answer no longer lie in a processor's cache.
+  static constexpr double kCached = 0x1p16;
   double fixed = 0, page = 0, patch = 0;    ///< finding: at all, a page of the R-tree, a patch
+  double beyond = 0;                        ///< what a patch beyond kCached takes on top
   double read_fixed = 0, read_patch = 0;    ///< reading: at all, a patch
   double blend_fixed = 0, blend_patch = 0;  ///< evaluating (k = 0): at all, a patch
   double sample = 0, edge = 0;  ///< a height; one along the edges of patches, of which there are about
                                 ///< sqrt(patches * heights)
-  double seconds(double pages, double patches) const { return fixed + page * pages + patch * patches; }
+  double seconds(double pages, double patches) const {
+    return fixed + page * pages + patch * patches + beyond * std::max(0.0, patches - kCached);
+  }
   double read_seconds(double patches) const { return read_fixed + read_patch * patches; }
   double blend_seconds(double patches, double samples) const {
     return blend_fixed + blend_patch * patches + sample * samples + edge * std::sqrt(patches * samples);
@@ -45,7 +51,7 @@ void save_model(Database& db, const CostModel& model);
 std::string machine_name();
 
 /// Measures how long finding takes with this database on this machine: answers to uniform cuts, coarse ones
-/// first, for a tenth of a second.
+/// first, for three tenths of a second.
 CostModel calibrate(const Database& db);
 /// The saved model, else a new one of finding alone.
 CostModel model_of(const Database& db);

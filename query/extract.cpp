@@ -13,6 +13,7 @@ namespace patchwork {
 
 namespace {
 
+constexpr std::size_t kKept = std::size_t{1} << 19;  // patches (20 MB) that a thread keeps room for
 constexpr double kBudgetFinest = 0x1p-20;  // of the largest error: where the search for a budget begins
 constexpr int kBudgetSteps = 24;  // halvings of those 20 octaves: the error is found to 2^-19 octaves
 
@@ -20,7 +21,8 @@ constexpr int kBudgetSteps = 24;  // halvings of those 20 octaves: the error is 
 
 Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
   const auto start = std::chrono::steady_clock::now();
-  std::vector<FoundPatch> found;
+  thread_local std::vector<FoundPatch> found;  // its memory serves the next answer
+  found.clear();
   double largest_asked = 0;
   const Database::Reading reading = db.reading();
   const Grid* last = nullptr;  // neighbours in the tree are mostly of one grid
@@ -42,6 +44,7 @@ Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
   const VisitCost visited =
       db.tree().visit([&](const LodPage& page, bool inside) { return cut.hits(page, inside); }, emit);
   Extraction result = in_order(found);
+  if (found.capacity() > kKept) std::vector<FoundPatch>().swap(found);
   if (strict) result.bound_max = std::min(result.bound_max, largest_asked);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   result.cost.nodes = visited.nodes, result.cost.boxes = visited.boxes, result.cost.seconds = seconds.count();

@@ -1,6 +1,7 @@
 #include "query/found.h"
 
 #include <algorithm>
+#include <boost/sort/pdqsort/pdqsort.hpp>
 
 #include "db/invariant.h"
 
@@ -17,14 +18,24 @@ double bound_of(const FoundPatch& f) {
 }
 
 // By bottom; ties by the order, the greater first. Ties are many, because a survey's finest patches tend to
-// be as good as the survey: within a grid they are told apart by two numbers.
+// be as good as the survey: within a grid they are told apart by two numbers, without a branch.
 void sort_by_priority(std::vector<FoundPatch>& found) {
-  std::sort(found.begin(), found.end(), [](const FoundPatch& a, const FoundPatch& b) {
-    if (a.bottom != b.bottom) return a.bottom < b.bottom;
-    if (a.grid == b.grid) return a.kernel != b.kernel ? a.kernel > b.kernel : a.index > b.index;
-    CoverageCounts ignored;
-    return less(*b.grid, b.index, *a.grid, a.index, ignored);
+  boost::sort::pdqsort_branchless(found.begin(), found.end(), [](const FoundPatch& a, const FoundPatch& b) {
+    const bool same = a.bottom == b.bottom, alike = same & (a.kernel == b.kernel);
+    return bool((a.bottom < b.bottom) | (same & (a.kernel > b.kernel)) | (alike & (a.index > b.index)));
   });
+  for (auto begin = found.begin(); begin != found.end();) {
+    auto end = begin;
+    bool one_grid = true;
+    for (; end != found.end() && end->bottom == begin->bottom; ++end) one_grid &= end->grid == begin->grid;
+    if (!one_grid)
+      std::sort(begin, end, [](const FoundPatch& a, const FoundPatch& b) {
+        CoverageCounts ignored;
+        if (a.grid != b.grid) return less(*b.grid, b.index, *a.grid, a.index, ignored);
+        return a.kernel != b.kernel ? a.kernel > b.kernel : a.index > b.index;
+      });
+    begin = end;
+  }
 }
 
 }  // namespace

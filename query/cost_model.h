@@ -63,8 +63,10 @@ inline constexpr std::size_t kSampledLeaves = 64;
 Cost expect(const Database& db, const CutSurface& cut, const CostModel& model);
 
 /// The smallest error on a ladder of quarter octaves below `most` (and 0) whose expected time is at most nine
-/// tenths of `seconds`, and none coarser is beyond it: so a larger budget never gives a larger error. What is
-/// read for the first time takes longer: where it did, the answer is taken once more.
+/// tenths of `seconds`, and none coarser is beyond it: so a larger budget never gives a larger error, while
+/// the machine is as fast as the model says. An answer that took longer than `seconds` (it was read for the
+/// first time, or the machine does something else) is taken once more, then a rung coarser, and so on, six
+/// rungs at most.
 Budgeted extract_in_time(const Database& db, const CostModel& model, double seconds, double most,
                          const std::function<std::unique_ptr<CutSurface>(double error)>& cut_at);
 

@@ -52,10 +52,10 @@ TEST_F(CostModelTest, AModelHasNoCostsBelowZero) {
 }
 
 TEST_F(CostModelTest, ErrorFallsWithTheTimeThatMayBeTaken) {
-  const CostModel model{2e-6, 1e-6, 1e-6};  // a machine that never changes
+  const CostModel model{2e-3, 1e-3, 1e-3};  // slower than any machine: no answer misses its time
   const auto cut_at = [](double error) { return make_surface(UniformCut{.error = error}); };
   double last = INFINITY;
-  for (const double seconds : {1e-9, 1e-5, 3e-5, 1e-4, 3e-4, 1.0}) {
+  for (const double seconds : {1e-9, 1e-2, 3e-2, 1e-1, 3e-1, 1e3}) {
     const Budgeted b = extract_in_time(*db_, model, seconds, 200, cut_at);
     EXPECT_LE(b.error, last) << seconds;
     EXPECT_EQ(b.extraction.patches, extract(*db_, {.error = b.error}).patches);
@@ -65,6 +65,24 @@ TEST_F(CostModelTest, ErrorFallsWithTheTimeThatMayBeTaken) {
     last = b.error;
   }
   EXPECT_EQ(last, 0);
+}
+
+TEST_F(CostModelTest, AnAnswerThatMissesItsTimeBecomesCoarser) {
+  const auto cut_at = [](double error) { return make_surface(UniformCut{.error = error}); };
+  const Budgeted in_vain = extract_in_time(*db_, CostModel{}, 1e-12, 200, cut_at);
+  EXPECT_GT(in_vain.error, 0) << "a model that promises everything at once";
+  EXPECT_EQ(in_vain.extraction.patches, extract(*db_, {.error = in_vain.error}).patches);
+  EXPECT_EQ(extract_in_time(*db_, CostModel{}, 1e3, 200, cut_at).error, 0);
+}
+
+TEST(CostModel, LargeAnswersTakeMoreForEachPatch) {
+  const CostModel truth{.fixed = 1e-6, .patch = 8e-8, .beyond = 1e-7};
+  std::vector<Measured> answers;
+  for (double patches = 10; patches < 1e6; patches *= 3)
+    answers.push_back({.pages = patches / 50, .patches = patches, .find = truth.seconds(0, patches)});
+  const CostModel found = fit(answers);
+  EXPECT_NEAR(found.seconds(0, 5e5), truth.seconds(0, 5e5), 0.01 * truth.seconds(0, 5e5));
+  EXPECT_GT(found.seconds(0, 2e5), 2 * found.seconds(0, 1e5));
 }
 
 TEST(CostModel, FitFindsTheCostsThatTimesWereMadeOf) {

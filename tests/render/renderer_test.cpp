@@ -186,6 +186,12 @@ TEST_F(TerrainTest, NearPlane) {
     EXPECT_LE(screen_error(best, camera, r.depth()).worst, 1.01);
   }
   report_law("NearPlane", "an eye half a metre above the ground among the tiles", 3);
+  // An edge that passes half a metre below an eye which looks along it, from 50 m ahead to 50 m behind.
+  const auto divided_by_w = [](double ahead) { return -0.5 / ahead; };
+  const double ends = std::abs(divided_by_w(50) - divided_by_w(-50));
+  const double in_front = std::abs(divided_by_w(50) - divided_by_w(0.1));
+  report_control("NearPlane", "what is seen of an edge past the eye, its ends divided by w", 1,
+                 in_front / ends, 1, "of its length by its ends");
   const FrameStats nothing = r.draw({{900, 800, z + 50}, {900, 800, z + 100}, 60, kWidth, kHeight});
   EXPECT_EQ(nothing.triangles, 0u);
   for (const float d : r.depth()) EXPECT_TRUE(std::isnan(d));

@@ -13,7 +13,7 @@
 
 namespace patchwork {
 
-enum class Command { end, help, overlay, map, wireframe, print, finer, coarser };
+enum class Command { end, help, overlay, map, wireframe, print, finer, coarser, play };
 
 /// What a person did since the last look.
 struct WindowInput {

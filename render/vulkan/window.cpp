@@ -44,7 +44,8 @@ struct Typed {
   Command command;
 };
 constexpr Typed kTyped[] = {{'o', Command::overlay}, {'m', Command::map},   {'g', Command::wireframe},
-                            {'p', Command::print},   {'+', Command::finer}, {'-', Command::coarser}};
+                            {'p', Command::print},   {'+', Command::finer}, {'-', Command::coarser},
+                            {' ', Command::play}};
 
 unsigned lower(unsigned character) {
   return character >= 'A' && character <= 'Z' ? character + ('a' - 'A') : character;

@@ -44,8 +44,10 @@ class View : public CliTest {
  protected:
   /// Runs `patchwork view` with `words` more on `display` while `person` acts; presses Esc in the end.
   Outcome fly(const VirtualDisplay& display, const std::string& database, Words words,
-              const std::function<void()>& person) const {
-    words.insert(words.begin(), {"view", database, "--scene", scene(), "--size", std::to_string(kWidth),
+              const std::function<void()>& person, const char* scene_text = kScene) const {
+    const std::string scene = in_directory("scene.json");
+    write_text(scene, scene_text);
+    words.insert(words.begin(), {"view", database, "--scene", scene, "--size", std::to_string(kWidth),
                                  std::to_string(kHeight), "--validation"});
     Circumstances c;
     c.in_child = [&] { setenv("DISPLAY", display.name().c_str(), 1); };
@@ -55,11 +57,6 @@ class View : public CliTest {
       end_soon(child);
     };
     return run(words, c);
-  }
-  std::string scene() const {
-    const std::string path = in_directory("scene.json");
-    write_text(path, kScene);
-    return path;
   }
 
  private:
@@ -104,6 +101,42 @@ TEST_F(View, FliesByKeysAndShowsWhatRenderMakes) {
   EXPECT_EQ(run({"render", database, picture, "--scene", printed}).code, 0);
   EXPECT_LT(changed(after, read_picture(picture), 2), 0.001);
   EXPECT_GT(changed(before, read_picture(picture), 2), 0.05) << "the control: another camera";
+}
+
+TEST_F(View, PlaysTheScenesPathUntilSomeoneSteers) {
+  const VirtualDisplay display(in_directory(""), 640, 480);
+  const std::string database = hill_database();
+  const char* const scene =
+      R"({"path": {"points": [[500100, 4999500, 420], [500300, 4999600, 420], [500500, 4999500, 420]],
+                                "speed_m_s": 100}, "pixel_error": 4})";
+  const Point3 first{500100, 4999500, 420}, last{500500, 4999500, 420};
+  const auto printed = [](const std::string& out) { return *parse_scene(out, "what P printed").camera; };
+  const Outcome played = fly(
+      display, database, {},
+      [&] {
+        display.settled(kWidth, kHeight);  // at rest at the end of the way
+        display.xdo("key p");
+        display.settled(kWidth, kHeight);
+      },
+      scene);
+  EXPECT_EQ(played.code, 0) << played.err;
+  EXPECT_LT(glm::distance(vec(printed(played.out).eye), vec(last)), 1e-6);
+
+  const Outcome steered = fly(
+      display, database, {},
+      [&] {
+        display.settled(kWidth, kHeight);
+        display.xdo("key space sleep 0.5 key e");  // once more, and up in the middle of the way
+        display.settled(kWidth, kHeight);
+        display.xdo("key p");
+        display.settled(kWidth, kHeight);
+      },
+      scene);
+  EXPECT_EQ(steered.code, 0) << steered.err;
+  const Point3 eye = printed(steered.out).eye;
+  EXPECT_GT(glm::distance(vec(eye), vec(last)), 1) << "it stayed where it was taken over";
+  EXPECT_GT(glm::distance(vec(eye), vec(first)), 1);
+  EXPECT_GT(eye.z, 420);
 }
 
 TEST_F(View, TurnsByTheMouseAndFollowsTheWindowsSize) {

@@ -54,7 +54,7 @@ void add_view(CLI::App& app, Common& common) {
   auto o = std::make_shared<Options>();
   CLI::App* v = verb(app, common, "view", "a window to fly in; F1 lists its keys");
   v->add_option("DB", o->database, "the database; what others commit to it shows up")->required();
-  v->add_option("--scene", o->scene, "JSON: camera, pixel error, effects (render/scene.schema.json)");
+  v->add_option("--scene", o->scene, "JSON: camera or path, pixel error, effects (render/scene.schema.json)");
   v->add_option("--size", o->size, "width height, pixels; else the scene's")
       ->expected(2)
       ->check(CLI::Range(1, 16384));

@@ -50,6 +50,7 @@ Rows FrameMeter::rows() {
                            {"Tiles drawn", grouped(last_.tiles_drawn)},
                            {"Tiles made", grouped(sum_.tiles_made)},
                            {"Tiles wanted", grouped(last_.tiles_wanted)},
+                           {"Tiles too coarse", grouped(last_.tiles_coarse)},
                            {"Triangles", last_.triangles > 0 ? grouped(last_.triangles) : "-"}});
   sum_ = {}, show_ms_ = 0, frames_ = 0;
   return rows;

@@ -33,6 +33,7 @@ const Rows kKeys{{"W  S", "forward, back"},
                  {"Wheel", "speed"},
                  {"Ctrl + wheel", "zoom"},
                  {},
+                 {"Space", "play the scene's path, or rest"},
                  {"+  -", "finer, coarser"},
                  {"O", "figures"},
                  {"M", "map of tiles"},
@@ -91,6 +92,8 @@ Viewer::Viewer(Database& db, const Scene& scene, const std::string& scene_text, 
                .validation = options.validation}),
       renderer_(window_.device(), db, realtime(scene, window_, options.memory)),
       fly_(first(db, scene)),
+      path_(scene.path ? std::optional<CameraPath>(*scene.path) : std::nullopt),
+      playing_(path_.has_value()),
       pixel_error_(scene.pixel_error),
       width_(window_.width()),
       height_(window_.height()),
@@ -141,6 +144,10 @@ bool Viewer::obey(const WindowInput& input) {
       case Command::print:
         print_scene();
         break;
+      case Command::play:
+        playing_ = path_ && !playing_;
+        if (playing_ && flown_ >= path_->length()) flown_ = 0;
+        break;
       case Command::finer:
         pixel_error_ = std::max(pixel_error_ / std::sqrt(2.0), kFinest);
         break;
@@ -157,12 +164,21 @@ void Viewer::steer(const WindowInput& input) {
   const auto now = Clock::now();
   const double passed = std::chrono::duration<double>(now - last_step_).count();
   last_step_ = now;
+  playing_ = playing_ && input.idle();
+  if (playing_) return play(std::min(passed, moves_ ? kLongestStep : kFirstStep));
   fly_.drag(input.drag_x, input.drag_y, std::max(window_.height(), 1));
   fly_.change_speed(input.speed), fly_.zoom(input.zoom);
   fly_.step(input.steering, std::min(passed, moves_ ? kLongestStep : kFirstStep));
   moves_ = fly_.moves() || !input.idle();
   if (fly_.moves())
     if (const auto ground = ground_below(db_, fly_.eye(), scene_)) fly_.keep_above(*ground + kClearance);
+}
+
+// Who steers takes over from where the path led.
+void Viewer::play(double seconds) {
+  flown_ = std::min(flown_ + scene_.path->speed * seconds, path_->length());
+  fly_ = {path_->at(flown_, window_.width(), window_.height()), fly_.speed()};
+  moves_ = playing_ = flown_ < path_->length();
 }
 
 bool Viewer::lay_panels() {

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "db/database.h"
+#include "render/camera_path.h"
 #include "render/scene.h"
 #include "render/window.h"
 #include "tools/view/frame_meter.h"
@@ -34,6 +36,7 @@ class Viewer {
 
   bool obey(const WindowInput& input);  // false: it is told to end
   void steer(const WindowInput& input);
+  void play(double seconds);
   double frame(const WindowInput& input);  // seconds until the next one is due
   bool lay_panels();                       // true: they look different
   void print_scene() const;
@@ -47,6 +50,9 @@ class Viewer {
   Window window_;
   Renderer renderer_;
   FlyCamera fly_;
+  std::optional<CameraPath> path_;  // the scene's
+  double flown_ = 0;                // metres along it
+  bool playing_;
   FrameMeter meter_;
   std::vector<Panel> panels_;
   bool overlay_ = true, help_ = false, map_ = false;

@@ -189,7 +189,7 @@ bool Viewer::lay_panels() {
   if (overlay_) {
     Rows rows = meter_.rows();
     rows.insert(rows.end(), {{},
-                             {"Speed", length_text(fly_.speed()) + "/s"},
+                             {"Speed", length_text(playing_ ? scene_.path->speed : fly_.speed()) + "/s"},
                              {"Eye", fmt::format("{:.0f} m", fly_.eye().z)},
                              {"Database", fmt::format("version {}", db_.version())},
                              {"", "F1: keys"}});

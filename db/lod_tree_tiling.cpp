@@ -56,7 +56,7 @@ class Tiling {
       return done(part_);
     }
     double least = INFINITY;
-    std::size_t key = 0, first = 0;
+    std::size_t key = 0, first = pages / 2;  // where no cost is a number
     for (std::size_t k = 0; k < Tile::kKeys; ++k)
       for (const double share : {0.5, 0.25, 0.75}) {
         const auto part = std::clamp<std::size_t>(std::size_t(share * double(pages) + 0.5), 1, pages - 1);

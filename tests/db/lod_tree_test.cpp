@@ -233,6 +233,19 @@ TEST(LodTree, ErasesOnlyWhatIsEqual) {
   expect_agrees(tree, all, boxes, 10);
 }
 
+TEST(LodTree, BuildHoldsBoxesWhoseAreasAreNoNumbers) {
+  std::vector<LodTree::Entry> entries;
+  for (std::uint64_t k = 0; k < 1000; ++k) {
+    const double x = (k % 2 ? 1e200 : -1e200) * double(1 + k % 7);
+    entries.push_back({{x, x, x + 1e199, x + 1e199, 0, k % 3 ? INFINITY : 1}, {k}});
+  }
+  const LodTree tree = LodTree::build(entries);
+  EXPECT_EQ(tree.find_violation(), "");
+  std::size_t found = 0;
+  tree.traverse([](const LodBox&) { return true; }, [&](const LodTree::Entry&) { ++found; });
+  EXPECT_EQ(found, entries.size());
+}
+
 TEST(LodTree, BuildGivesTheSamePagesForTheSameOrder) {
   Boxes boxes(seed());
   std::vector<Entry> all = boxes.take(5000);

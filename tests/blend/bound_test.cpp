@@ -76,7 +76,7 @@ TEST_F(BoundHolds, IsWhatWasAskedForWhereverAKernelOffersIt) {
   EXPECT_GT(weighted_beyond, 0u) << "negative control: the weighted blend is diluted by coarse neighbours";
 }
 
-// PATCHWORK_TRIALS=1000 takes as many cameras as the design asks for.
+// PATCHWORK_TRIALS=1000 takes as many cameras, and points a camera, as the design asks for.
 int cameras() {
   const char* given = std::getenv("PATCHWORK_TRIALS");
   return given ? std::atoi(given) : 40;
@@ -106,7 +106,7 @@ TEST_F(BoundHolds, UnderViewsWhereverAKernelOffersIt) {
     view = over_terrain_of(db(), view);
     const auto surface = make_surface(view);
     const Extraction x = extract(db(), view);
-    const Points points = random_points(e, 3000, random);
+    const Points points = random_points(e, cameras() >= 1000 ? 100000 : 3000, random);
     const Answers a = evaluate(db(), x.patches, points), best = evaluate(db(), 0, points);
     const Answers w = evaluate(db(), x.patches, points, {.composition = Composition::weighted});
     std::vector<bool> in_view(points.size());

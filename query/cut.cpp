@@ -57,66 +57,77 @@ std::vector<Point> convex_hull(std::vector<Point> points) {
   return hull;
 }
 
-// Eight sides of a convex region: inside are the points with nx x + ny y <= most. What is positive of a
-// normal stands apart from what is negative, so that a box's innermost and outermost corner need no choice.
-struct Sides {
-  static constexpr std::size_t kCount = 8;
-  double nx_up[kCount] = {}, nx_down[kCount] = {}, ny_up[kCount] = {}, ny_down[kCount] = {};
-  double most[kCount], nearly[kCount];  // nearly: with a hair of slack
+// A side of a convex region: inside are the points with nx x + ny y <= most. What is positive of a normal
+// stands apart from what is negative, so that a box's innermost and outermost corner need no choice.
+struct Side {
+  double nx_up, nx_down, ny_up, ny_down;
+  double most, nearly;  // nearly: with a hair of slack
 
-  Sides() { std::fill_n(most, kCount, INFINITY), std::fill_n(nearly, kCount, INFINITY); }
-  void set(std::size_t k, double nx, double ny, double limit);
-  bool beyond(std::size_t k, Point p) const {
-    return (nx_up[k] + nx_down[k]) * p.x + (ny_up[k] + ny_down[k]) * p.y > most[k];
-  }
+  Side(double nx, double ny, double limit);
+  bool beyond(Point p) const { return (nx_up + nx_down) * p.x + (ny_up + ny_down) * p.y > most; }
 };
 
-// All slots are compared, in use or not: loops of fixed length become vectors. A hair of slack makes up for
-// the rounding of squares, which stand for roots.
+// A hair of slack makes up for the rounding of squares, which stand for roots.
 constexpr double kHair = 1e-9;
 
+double lesser(double a, double b) { return a < b ? a : b; }
+double greater(double a, double b) { return a > b ? a : b; }
+
 // Boxes that meet `bounds` and whose errors meet k times the squared distance from the eye, which is
-// `height` above the plane.
+// `height` above the plane. Each condition is an amount that must not be negative, so that the least of them
+// decides; all slots are compared, in use or not: loops of fixed length become vectors.
 PATCHWORK_VECTORIZED void near_enough(const LodPage& page, Point eye, double height, double k, Extent bounds,
                                       std::uint8_t* __restrict hit) {
-  const double h = height * height;
+  const double h = height * height, k_far = k * (1 + kHair), k_near = k * (1 - kHair);
+  double least[LodPage::kSlots];
   for (std::uint32_t s = 0; s < LodPage::kSlots; ++s) {
     const double left = page.xmin[s] - eye.x, right = eye.x - page.xmax[s];
     const double below = page.ymin[s] - eye.y, above = eye.y - page.ymax[s];
-    const double in_x = left > right ? left : right, in_y = below > above ? below : above;
-    const double dx = in_x > 0 ? in_x : 0, dy = in_y > 0 ? in_y : 0;
-    const double fx = std::abs(left) > std::abs(right) ? left : right;
-    const double fy = std::abs(below) > std::abs(above) ? below : above;
+    const double fx = lesser(left, right), fy = lesser(below, above);
+    const double dx = greater(greater(left, right), 0), dy = greater(greater(below, above), 0);
     const double bottom = page.bottom[s], top = page.top[s];
-    hit[s] = std::uint8_t((bottom * bottom * (1 - kHair) <= k * (fx * fx + fy * fy + h)) &
-                          (k * (dx * dx + dy * dy + h) * (1 - kHair) < top * top) &
-                          (page.xmin[s] <= bounds.xmax) & (bounds.xmin <= page.xmax[s]) &
-                          (page.ymin[s] <= bounds.ymax) & (bounds.ymin <= page.ymax[s]));
+    const double outside = greater(greater(page.xmin[s] - bounds.xmax, bounds.xmin - page.xmax[s]),
+                                   greater(page.ymin[s] - bounds.ymax, bounds.ymin - page.ymax[s]));
+    least[s] = lesser(lesser(k_far * (fx * fx + fy * fy + h) - bottom * bottom,
+                             top * top - k_near * (dx * dx + dy * dy + h)),
+                      -outside);
   }
+  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s) hit[s] = std::uint8_t(least[s] >= 0);
 }
 
-void Sides::set(std::size_t k, double nx, double ny, double limit) {
-  nx_up[k] = std::max(nx, 0.0), nx_down[k] = std::min(nx, 0.0);
-  ny_up[k] = std::max(ny, 0.0), ny_down[k] = std::min(ny, 0.0);
-  most[k] = limit, nearly[k] = limit + kHair * std::abs(limit);
-}
+Side::Side(double nx, double ny, double limit)
+    : nx_up(greater(nx, 0)),
+      nx_down(lesser(nx, 0)),
+      ny_up(greater(ny, 0)),
+      ny_down(lesser(ny, 0)),
+      most(limit),
+      nearly(limit + kHair * std::abs(limit)) {}
 
 // Of the boxes that a page met those that have a corner on the inner side of each side; `inside` are those
-// that have all corners there. Few are left to be asked, so vectors go along the sides.
-PATCHWORK_VECTORIZED void keep_inside(const LodPage& page, const Sides& sides, LodHits& hits) {
+// that have all corners there. Few are left to be asked: they are gathered, eight to a vector.
+PATCHWORK_VECTORIZED void keep_inside(const LodPage& page, const std::vector<Side>& sides, LodHits& hits) {
+  constexpr std::uint32_t kEight = 8;
+  using Eight = double __attribute__((vector_size(kEight * sizeof(double))));
   std::uint64_t out = 0, not_whole = 0;
-  for (std::uint64_t left = hits.met; left; left &= left - 1) {
-    const int s = std::countr_zero(left);
-    const double x0 = page.xmin[s], y0 = page.ymin[s], x1 = page.xmax[s], y1 = page.ymax[s];
-    std::int64_t outside = 0, partly = 0;
-    for (std::size_t k = 0; k < Sides::kCount; ++k) {
-      const double inner =
-          (sides.nx_up[k] * x0 + sides.nx_down[k] * x1) + (sides.ny_up[k] * y0 + sides.ny_down[k] * y1);
-      const double outer =
-          (sides.nx_up[k] * x1 + sides.nx_down[k] * x0) + (sides.ny_up[k] * y1 + sides.ny_down[k] * y0);
-      outside |= std::int64_t{inner > sides.nearly[k]}, partly |= std::int64_t{outer > sides.most[k]};
+  for (std::uint64_t left = hits.met; left;) {
+    Eight x0 = {}, y0 = {}, x1 = {}, y1 = {};
+    std::uint32_t slot[kEight], n = 0;
+    for (; left && n < kEight; left &= left - 1, ++n) {
+      const auto s = slot[n] = std::uint32_t(std::countr_zero(left));
+      x0[n] = page.xmin[s], y0[n] = page.ymin[s], x1[n] = page.xmax[s], y1[n] = page.ymax[s];
     }
-    out |= std::uint64_t(outside) << s, not_whole |= std::uint64_t(partly) << s;
+    Eight inner = Eight{} - INFINITY, outer = inner;  // how far a box's corners lie beyond any side
+    for (const Side& side : sides) {
+      const Eight in =
+          (side.nx_up * x0 + side.nx_down * x1) + (side.ny_up * y0 + side.ny_down * y1) - side.nearly;
+      const Eight at =
+          (side.nx_up * x1 + side.nx_down * x0) + (side.ny_up * y1 + side.ny_down * y0) - side.most;
+      inner = in > inner ? in : inner, outer = at > outer ? at : outer;
+    }
+    for (std::uint32_t i = 0; i < n; ++i) {
+      out |= std::uint64_t{inner[i] > 0} << slot[i];
+      not_whole |= std::uint64_t{outer[i] > 0} << slot[i];
+    }
   }
   hits.met &= ~out, hits.inside &= ~(out | not_whole);
 }
@@ -131,8 +142,7 @@ class ViewSurface : public CutSurface {
     for (std::size_t k = 0; corners_.size() >= 3 && k < corners_.size(); ++k) {
       const Point &a = corners_[k], &b = corners_[(k + 1) % corners_.size()];
       const double nx = b.y - a.y, ny = a.x - b.x;  // outward of a counterclockwise polygon
-      if (k % Sides::kCount == 0) sides_.emplace_back();
-      sides_.back().set(k % Sides::kCount, nx, ny, std::max(nx * a.x + ny * a.y, nx * b.x + ny * b.y));
+      sides_.emplace_back(nx, ny, std::max(nx * a.x + ny * a.y, nx * b.x + ny * b.y));
       bounds_ = {std::min(bounds_.xmin, a.x), std::min(bounds_.ymin, a.y), std::max(bounds_.xmax, a.x),
                  std::max(bounds_.ymax, a.y)};
     }
@@ -157,11 +167,10 @@ class ViewSurface : public CutSurface {
     const Frame& f = grid.info.frame;
     const Point rect[] = {f.to_domain(d.i0, d.j0), f.to_domain(d.i1, d.j0), f.to_domain(d.i1, d.j1),
                           f.to_domain(d.i0, d.j1)};
-    for (const Sides& eight : sides_)
-      for (std::size_t k = 0; k < Sides::kCount; ++k) {
-        const auto beyond = [&](const Point& p) { return eight.beyond(k, p); };
-        if (std::all_of(std::begin(rect), std::end(rect), beyond)) return false;
-      }
+    for (const Side& side : sides_) {
+      const auto beyond = [&](const Point& p) { return side.beyond(p); };
+      if (std::all_of(std::begin(rect), std::end(rect), beyond)) return false;
+    }
     LatticeRect seen{INFINITY, INFINITY, -INFINITY, -INFINITY};
     for (const Point& c : corners_) {
       const Point p = f.to_lattice(c.x, c.y);
@@ -177,7 +186,7 @@ class ViewSurface : public CutSurface {
     LodHits hits{page.mask_of_used(hit)};
     hits.inside = hits.met;
     if (inside) return hits;
-    for (const Sides& eight : sides_) keep_inside(page, eight, hits);
+    keep_inside(page, sides_, hits);
     return hits;
   }
 
@@ -187,7 +196,7 @@ class ViewSurface : public CutSurface {
   double slope_;  // metres of tolerance a metre of distance
   std::vector<Point> corners_;
   Extent bounds_{INFINITY, INFINITY, -INFINITY, -INFINITY};  // of the corners
-  std::vector<Sides> sides_;
+  std::vector<Side> sides_;
 };
 
 }  // namespace

@@ -38,6 +38,8 @@ class LazyTable {
     T* const slot = slots_[i].load(std::memory_order_acquire);
     return slot ? *slot : fault(i);
   }
+  /// The slot if it is in memory, else nullptr.
+  const T* find(std::size_t i) const { return slots_[i].load(std::memory_order_acquire); }
   /// Slots that are in memory.
   std::size_t loaded() const { return loaded_.load(std::memory_order_relaxed); }
 

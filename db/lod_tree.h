@@ -155,6 +155,9 @@ VisitCost LodTree::walk(Hits hits, Emit& emit) const {
     }
     const auto slot = std::uint32_t(std::countr_zero(top.left.met));
     top.left.met &= top.left.met - 1;
+    if (top.left.met != 0)
+      if (const LodPage* next = pages_.find(top.page->child(std::uint32_t(std::countr_zero(top.left.met)))))
+        next->prefetch();
     enter(pages_[top.page->child(slot)], top.left.inside >> slot & 1);
   }
   return cost;

@@ -141,7 +141,7 @@ struct Renderer::Impl {
     stats.sky_dispatches = effects.sky_dispatches() - skies;
     terrain.use(effects);
     timer.mark(c);
-    terrain.record_factors(c);
+    terrain.record_meshes(c);
     timer.mark(c);
     const float background[4] = {float(options.background.r) / 255, float(options.background.g) / 255,
                                  float(options.background.b) / 255, 1};
@@ -154,7 +154,8 @@ struct Renderer::Impl {
     commands.submit(), commands.wait();
     const std::vector<double> ms = timer.intervals();
     stats.light_ms = ms[0], stats.factors_ms = ms[1], stats.draw_ms = ms[2];
-    stats.dispatches += (terrain.draws() > 0 ? 2 : 0) + stats.shadow_dispatches + stats.sky_dispatches;
+    stats.dispatches += (terrain.tiles() > 0 ? vk::TerrainPass::kMeshDispatches : 0) +
+                        stats.shadow_dispatches + stats.sky_dispatches;
     stats.draws = terrain.draws();
     if (counter)
       card.check(vkGetQueryPoolResults(card.get(), counter.get(), 0, 1, 8, &stats.triangles, 8,

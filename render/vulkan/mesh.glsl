@@ -1,0 +1,22 @@
+// The mesh of a block of 8 x 8 cells, for the shaders that make it. A block begins as two triangles. Each vertex but
+// its corners is the middle of the longest side of the triangles that it halves: first the middle of the block, then
+// those of its edges, then those of its quarters, and so on. A block's mesh is the set of its vertices, closed
+// so that none is there without the two whose triangles it halves; what a neighbour has on a shared edge
+// besides splits the triangles along it into fans.
+#include "terrain.glsl"
+
+// Of each block of each draw.
+struct Mesh {
+  uvec2 inside;     // bit 7 (y - 1) + x - 1: vertex (x, y), 1 to 7
+  uint edges;       // bit 8 s + p: vertex p of side s (TileKey::beside), 1 to 7
+  bool seen;
+  bool falls;       // alone, its two triangles share the side from (0, 8) to (8, 0); else from (0, 0) to (8, 8)
+};
+const uint kUnseen = 0x80000000u, kFalls = 0x40000000u, kInsideHigh = 0x1ffffu, kEdges = 0xfefefefeu;
+
+uvec4 packed(Mesh m) {
+  return uvec4(m.inside.x, m.inside.y | (m.seen ? 0 : kUnseen) | (m.falls ? kFalls : 0), m.edges, 0);
+}
+Mesh unpacked(uvec4 t) {
+  return Mesh(uvec2(t.x, t.y & kInsideHigh), t.z, (t.y & kUnseen) == 0, (t.y & kFalls) != 0);
+}

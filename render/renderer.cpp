@@ -266,6 +266,14 @@ bool Renderer::refresh(Database& db) {
 
 Renderer::Drawn Renderer::drawn() const { return {impl_->store, impl_->block, impl_->draws}; }
 
+std::vector<Renderer::MeshVertex> Renderer::mesh() const {
+  std::vector<MeshVertex> mesh;
+  for (const std::uint32_t n : impl_->terrain.read_mesh(impl_->commands))  // terrain.glsl: name_of
+    mesh.push_back({n >> 16, std::int32_t((n >> 8 & 7) << 5 | (n & 15) << 1 | (n >> 14 & 1)),
+                    std::int32_t((n >> 11 & 7) << 5 | (n >> 4 & 15) << 1 | (n >> 15 & 1))});
+  return mesh;
+}
+
 void Renderer::reshape(int width, int height, double pixel_error) {
   RendererOptions& o = impl_->options;
   o.pixel_error = pixel_error;

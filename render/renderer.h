@@ -93,6 +93,13 @@ class Renderer {
     std::span<const TileDraw> draws;
   };
   Drawn drawn() const;
+  /// A vertex of the mesh: which of drawn().draws, and its half cells there.
+  struct MeshVertex {
+    std::uint32_t draw;
+    std::int32_t x, y;
+  };
+  /// Three for each triangle of the last frame, seen or clipped, counterclockwise from above.
+  std::vector<MeshVertex> mesh() const;
   /// From the next frame on: another size of the picture (pixels, at least 1 x 1), another error. Tiles stay.
   void reshape(int width, int height, double pixel_error);
   /// Onto a picture of any size: what picture() has of a legend.

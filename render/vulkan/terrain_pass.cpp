@@ -102,7 +102,9 @@ void TerrainPass::reserve(std::size_t draws) {
   const std::size_t bytes = draws * TileStore::kMostTriangles * 12;
   if (bytes <= indices_.bytes()) return;
   indices_ = Buffer(mesh_bindings_.device(), bytes + bytes / 4,
-                    VK_BUFFER_USAGE_INDEX_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, Where::card);
+                    VK_BUFFER_USAGE_INDEX_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
+                        VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                    Where::card);
   mesh_bindings_.bind(mesh_set_, 10, indices_);
 }
 
@@ -132,6 +134,23 @@ void TerrainPass::record_meshes(VkCommandBuffer commands) const {
     vkCmdDispatch(commands, tiles(), 1, 1);
     barrier(commands);
   }
+}
+
+std::vector<std::uint32_t> TerrainPass::read_mesh(Commands& commands) const {
+  std::vector<std::uint32_t> names;
+  if (tiles() == 0) return names;
+  const Buffer to(mesh_bindings_.device(), indices_.bytes(), VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                  Where::readback);
+  const VkCommandBuffer c = commands.begin();
+  const VkBufferCopy all{0, 0, indices_.bytes()};
+  vkCmdCopyBuffer(c, indices_.get(), to.get(), 1, &all);
+  barrier(c);
+  commands.submit(), commands.wait();
+  const auto* from = reinterpret_cast<const std::uint32_t*>(to.mapped());
+  const auto* calls = reinterpret_cast<const VkDrawIndexedIndirectCommand*>(calls_.mapped());
+  for (int k = 0; k < 2; ++k)
+    names.insert(names.end(), from + calls[k].firstIndex, from + calls[k].firstIndex + calls[k].indexCount);
+  return names;
 }
 
 TerrainPass::Pipelines TerrainPass::make_pipelines(const FrameEffects& effects) const {

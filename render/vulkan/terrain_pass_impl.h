@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "blend/vulkan/pipeline_impl.h"
 #include "render/tile_seams.h"
@@ -37,6 +38,9 @@ class TerrainPass {
   void use(const FrameEffects& effects);
   /// Inside of one, after use.
   void record_draws(VkCommandBuffer commands) const;
+
+  /// The names of the vertices of all triangles that were recorded last (terrain.glsl). Waits for the card.
+  std::vector<std::uint32_t> read_mesh(Commands& commands) const;
 
   std::size_t bytes_set() const { return bytes_set_; }  ///< by the last call
   std::uint32_t tiles() const { return solid_ + holed_; }

@@ -14,6 +14,7 @@ layout(binding = 5) readonly buffer Slots { uint slots[]; };
 layout(binding = 6, rg16f) writeonly uniform image2DArray knowledge;    // only with kKnowing: bound, source
 layout(binding = 7) uniform isamplerBuffer words;                       // the results as whole numbers
 layout(constant_id = 0) const bool kKnowing = false;
+layout(constant_id = 1) const bool kPublished = false;
 layout(push_constant) uniform Push {
   uint bound_at, slope_at;  // where planes begin
   float shift;              // metres: from the evaluator's base to the slots'
@@ -89,11 +90,35 @@ float quarter_error(int base, ivec2 middle, ivec2 u, int size, bool rim) {
   return error_of(r);
 }
 
+// With shortest sides: how far the surface lies above the middles of the longest and of the others.
+float shortest_error(float longest, vec2 others, bvec2 rim) {
+  const vec2 on_rim = others * vec2(rim);
+  return error_of(vec4(min(min(longest, 0), min(others.x, others.y)), max(max(longest, 0), max(others.x, others.y)),
+                       min(min(on_rim.x, on_rim.y), 0), max(max(on_rim.x, on_rim.y), 0)));
+}
+
+void measure_cell(int base, ivec2 from, bool drop, bvec4 rim) {
+  const ivec2 x = ivec2(1, 0), y = ivec2(0, 1);
+  const float a = height_at(base, from), b = height_at(base, from + 2 * x);
+  const float c = height_at(base, from + 2), d = height_at(base, from + 2 * y);
+  const float longest = height_at(base, from + 1) - 0.5 * (drop ? b + d : a + c);
+  const vec4 sides = vec4(height_at(base, from + y), height_at(base, from + 2 * x + y), height_at(base, from + x),
+                          height_at(base, from + x + 2 * y)) - 0.5 * vec4(a + d, b + c, a + b, c + d);
+  const float one = shortest_error(longest, drop ? sides.xz : sides.yz, drop ? rim.xz : rim.yz);
+  const float other = shortest_error(longest, drop ? sides.yw : sides.xw, drop ? rim.yw : rim.xw);
+  finest = max(finest, max(one, other));
+}
+
 // A square of `size` half cells, `at` squares from the block's corner: halved along the diagonal that the mesh has
 // there, and quartered around its middle. `rim`: sides along which others may split triangles.
 void measure_square(int base, ivec2 block, ivec2 at, int size, bvec4 rim) {
   const ivec2 from = block + size * at, middle = (2 * at + 1) * size / 4, x = ivec2(1, 0), y = ivec2(0, 1);
   const ivec2 a = from, b = from + size * x, c = from + size, d = from + size * y;
+  const bool drop = ((at.x ^ at.y) & 1) != 0;
+  if (size == 2) {
+    measure_cell(base, from, drop, rim);
+    return;
+  }
   if (size == kBlockSamples) {
     const bvec2 none = bvec2(false);  // it is quartered before others split its sides
     const float rises = max(half_error(base, b, -x, y, size, none), half_error(base, d, x, -y, size, none));
@@ -101,16 +126,11 @@ void measure_square(int base, ivec2 block, ivec2 at, int size, bvec4 rim) {
     falls = drops < rises;
     note(middle, min(rises, drops));
   } else {
-    const bool drop = ((at.x ^ at.y) & 1) != 0;
     const ivec2 across = drop ? x : -x;
     const float one = half_error(base, drop ? a : b, across, y, size, bvec2(rim.z, drop ? rim.x : rim.y));
     const float other = half_error(base, drop ? c : d, -across, -y, size, bvec2(rim.w, drop ? rim.y : rim.x));
-    if (size == 2)
-      finest = max(finest, max(one, other));
-    else
-      note(middle, max(one, other));
+    note(middle, max(one, other));
   }
-  if (size == 2) return;
   const int reaches = size / 4;
   note(middle - reaches * x, quarter_error(base, from + size / 2, -x, size / 2, rim.x));
   note(middle + reaches * x, quarter_error(base, from + size / 2, x, size / 2, rim.y));
@@ -207,7 +227,7 @@ void measure(int base, int bound_base, int slot, int b) {
   finest = 0, falls = false;
   vec3 own = vec3(kNothing);
   if (!holes) {
-    for (int d = 0; d < 3; ++d) own[d] = published(base, block, 4 << d);
+    for (int d = 0; kPublished && d < 3; ++d) own[d] = published(base, block, 4 << d);
     const ivec2 here = ivec2(b % 8, b / 8);
     for (int size = kBlockSamples; size >= 2; size /= 2) {
       const int last = kBlockSamples / size - 1;

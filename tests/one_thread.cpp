@@ -7,9 +7,9 @@ namespace {
 const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
 }
 
-// GDAL takes its own locks in either order, and lavapipe destroys its fences' locks while they are let go;
-// that is not ours to mend.
+// GDAL takes its own locks in either order, lavapipe and the validation layer destroy locks of theirs while
+// they are let go; that is not ours to mend.
 extern "C" const char* __tsan_default_suppressions();
 extern "C" const char* __tsan_default_suppressions() {
-  return "deadlock:libgdal.so\nrace:libvulkan_lvp.so\n";
+  return "deadlock:libgdal.so\nrace:libvulkan_lvp.so\nrace:libVkLayer_khronos_validation.so\n";
 }

@@ -91,6 +91,12 @@ UniformGrid::UniformGrid(const Database& db, const Extent& extent, const CheckPo
     check(file->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, raster.width, raster.height, heights.data(),
                                            raster.width, raster.height, GDT_Float32, 0, 0, nullptr),
           path);
+  }
+  {
+    // Opened anew, and on one thread: GDAL's overviews read what they wrote, and its reading threads wait for
+    // ever for writing ones where a block of the one drives out a block of the other (3.6).
+    const GDALDatasetUniquePtr file(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+    if (!file) throw Error(path, "GDAL cannot open the uniform grid");
     std::vector<int> factors;
     for (int f = 2; std::max(raster.width, raster.height) / f >= 2; f *= 2) factors.push_back(f);
     check(file->BuildOverviews("BILINEAR", int(factors.size()), factors.data(), 0, nullptr, nullptr, nullptr),

@@ -141,7 +141,7 @@ struct Renderer::Impl {
     stats.sky_dispatches = effects.sky_dispatches() - skies;
     terrain.use(effects);
     timer.mark(c);
-    terrain.record_meshes(c);
+    terrain.record_factors(c);
     timer.mark(c);
     const float background[4] = {float(options.background.r) / 255, float(options.background.g) / 255,
                                  float(options.background.b) / 255, 1};
@@ -154,8 +154,7 @@ struct Renderer::Impl {
     commands.submit(), commands.wait();
     const std::vector<double> ms = timer.intervals();
     stats.light_ms = ms[0], stats.factors_ms = ms[1], stats.draw_ms = ms[2];
-    stats.dispatches += (terrain.tiles() > 0 ? vk::TerrainPass::kMeshDispatches : 0) +
-                        stats.shadow_dispatches + stats.sky_dispatches;
+    stats.dispatches += (terrain.draws() > 0 ? 2 : 0) + stats.shadow_dispatches + stats.sky_dispatches;
     stats.draws = terrain.draws();
     if (counter)
       card.check(vkGetQueryPoolResults(card.get(), counter.get(), 0, 1, 8, &stats.triangles, 8,
@@ -265,14 +264,6 @@ bool Renderer::refresh(Database& db) {
 }
 
 Renderer::Drawn Renderer::drawn() const { return {impl_->store, impl_->block, impl_->draws}; }
-
-std::vector<Renderer::MeshVertex> Renderer::mesh() const {
-  std::vector<MeshVertex> mesh;
-  for (const std::uint32_t n : impl_->terrain.read_mesh(impl_->commands))  // terrain.glsl: name_of
-    mesh.push_back({n >> 16, std::int32_t((n >> 8 & 7) << 5 | (n & 15) << 1 | (n >> 14 & 1)),
-                    std::int32_t((n >> 11 & 7) << 5 | (n >> 4 & 15) << 1 | (n >> 15 & 1))});
-  return mesh;
-}
 
 void Renderer::reshape(int width, int height, double pixel_error) {
   RendererOptions& o = impl_->options;

@@ -37,7 +37,7 @@ struct RendererOptions {
   bool realtime = false;
   double make_ms = 8;
   int workers = 1;
-  bool published = false;     ///< tessellation as published, without the guarantee (vulkan/needs.comp)
+  bool published = false;     ///< tessellation as published, without the guarantee (vulkan/factors.comp)
   SceneEffects effects = {};  ///< what is not there costs no shader, buffer or dispatch
   bool legend = true;         ///< drawn into picture() where an effect has a scale
 };
@@ -52,7 +52,7 @@ struct FrameStats {
   std::size_t tiles_stale = 0;   ///< drawn as the database was, because they are not made anew yet
   bool workers_held = false;     ///< the database is about to move
   std::size_t patches_sent = 0, bytes_up = 0;
-  std::size_t dispatches = 0, draws = 0;  ///< the blend's own not counted; indirect draws
+  std::size_t dispatches = 0, draws = 0;  ///< the blend's own not counted; draws of the indirect calls
   std::uint64_t triangles = 0;            ///< 0 where the device does not count
   double pixels_asked = 0, pixels_reached = 0;
   double bound_max = 0;                                   ///< metres: of all heights drawn
@@ -93,13 +93,6 @@ class Renderer {
     std::span<const TileDraw> draws;
   };
   Drawn drawn() const;
-  /// A vertex of the mesh: which of drawn().draws, and its half cells there.
-  struct MeshVertex {
-    std::uint32_t draw;
-    std::int32_t x, y;
-  };
-  /// Three for each triangle of the last frame, seen or clipped, counterclockwise from above.
-  std::vector<MeshVertex> mesh() const;
   /// From the next frame on: another size of the picture (pixels, at least 1 x 1), another error. Tiles stay.
   void reshape(int width, int height, double pixel_error);
   /// Onto a picture of any size: what picture() has of a legend.

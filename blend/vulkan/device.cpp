@@ -111,9 +111,11 @@ VkPhysicalDeviceFeatures drawing_features(VkPhysicalDevice device, std::uint32_t
   VkPhysicalDeviceFeatures has{}, use{};
   vkGetPhysicalDeviceFeatures(device, &has);
   if (!(families[family].queueFlags & VK_QUEUE_GRAPHICS_BIT)) missing = "its queue does not draw";
-  if (!has.fullDrawIndexUint32) missing = "its vertices have no numbers of 32 bits";
+  if (!has.tessellationShader) missing = "it does not tessellate";
+  if (!has.multiDrawIndirect || !has.drawIndirectFirstInstance) missing = "it has no indirect draws";
   if (!has.shaderStorageImageExtendedFormats) missing = "its shaders write no images of two channels";
-  use.fullDrawIndexUint32 = has.fullDrawIndexUint32;
+  use.tessellationShader = has.tessellationShader, use.multiDrawIndirect = has.multiDrawIndirect;
+  use.drawIndirectFirstInstance = has.drawIndirectFirstInstance;
   use.shaderStorageImageExtendedFormats = has.shaderStorageImageExtendedFormats;
   use.pipelineStatisticsQuery = has.pipelineStatisticsQuery, use.fillModeNonSolid = has.fillModeNonSolid;
   return use;

@@ -7,6 +7,7 @@ namespace {
 // The parts of a pipeline that are the same for all.
 struct Fixed {
   VkPipelineVertexInputStateCreateInfo vertices{};
+  VkPipelineTessellationStateCreateInfo tessellation{};
   VkPipelineViewportStateCreateInfo viewport{};
   VkPipelineMultisampleStateCreateInfo samples{};
   VkPipelineColorBlendAttachmentState written{};
@@ -16,6 +17,8 @@ struct Fixed {
 
   Fixed() {
     vertices.sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO;
+    tessellation.sType = VK_STRUCTURE_TYPE_PIPELINE_TESSELLATION_STATE_CREATE_INFO;
+    tessellation.patchControlPoints = 1;
     viewport.sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO;
     viewport.viewportCount = viewport.scissorCount = 1;
     samples.sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO;
@@ -49,7 +52,7 @@ OwnedPipeline make_graphics(const Bindings& bindings, VkRenderPass pass, const G
   const Fixed fixed;
   VkPipelineInputAssemblyStateCreateInfo assembly{};
   assembly.sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO;
-  assembly.topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
+  assembly.topology = state.topology;
   VkPipelineRasterizationStateCreateInfo raster{};
   raster.sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO, raster.lineWidth = 1;
   raster.polygonMode = state.lines ? VK_POLYGON_MODE_LINE : VK_POLYGON_MODE_FILL;
@@ -63,6 +66,7 @@ OwnedPipeline make_graphics(const Bindings& bindings, VkRenderPass pass, const G
   info.sType = VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO;
   info.stageCount = std::uint32_t(stages.size()), info.pStages = stages.data();
   info.pVertexInputState = &fixed.vertices, info.pInputAssemblyState = &assembly;
+  if (state.topology == VK_PRIMITIVE_TOPOLOGY_PATCH_LIST) info.pTessellationState = &fixed.tessellation;
   info.pViewportState = &fixed.viewport, info.pRasterizationState = &raster;
   info.pMultisampleState = &fixed.samples, info.pDepthStencilState = &depth;
   info.pColorBlendState = &fixed.colors, info.pDynamicState = &fixed.dynamic;

@@ -8,17 +8,20 @@ namespace {
 constexpr std::uint32_t kTileFinish[] = {
 #include "tile_finish.comp.inc"
 };
-constexpr std::uint32_t kNeeds[] = {
-#include "needs.comp.inc"
+constexpr std::uint32_t kFactors[] = {
+#include "factors.comp.inc"
 };
 constexpr std::uint32_t kEdges[] = {
 #include "edges.comp.inc"
 };
-constexpr std::uint32_t kTriangles[] = {
-#include "triangles.comp.inc"
-};
 constexpr std::uint32_t kTerrainVert[] = {
 #include "terrain.vert.inc"
+};
+constexpr std::uint32_t kTerrainTesc[] = {
+#include "terrain.tesc.inc"
+};
+constexpr std::uint32_t kTerrainTese[] = {
+#include "terrain.tese.inc"
 };
 constexpr std::uint32_t kTerrainFrag[] = {
 #include "terrain.frag.inc"
@@ -36,10 +39,11 @@ constexpr std::uint32_t kLight[] = {
 }  // namespace
 
 std::span<const std::uint32_t> tile_finish() { return kTileFinish; }
-std::span<const std::uint32_t> needs() { return kNeeds; }
+std::span<const std::uint32_t> factors() { return kFactors; }
 std::span<const std::uint32_t> edges() { return kEdges; }
-std::span<const std::uint32_t> triangles() { return kTriangles; }
 std::span<const std::uint32_t> terrain_vert() { return kTerrainVert; }
+std::span<const std::uint32_t> terrain_tesc() { return kTerrainTesc; }
+std::span<const std::uint32_t> terrain_tese() { return kTerrainTese; }
 std::span<const std::uint32_t> terrain_frag() { return kTerrainFrag; }
 std::span<const std::uint32_t> sky_vert() { return kSkyVert; }
 std::span<const std::uint32_t> sky_frag() { return kSkyFrag; }

@@ -8,12 +8,12 @@ layout(binding = 0) uniform FrameBlock {
   vec4 right, up;  // of the view, to the picture's edges at depth 1; w: 2 / width, 2 / height, pixels
   vec4 eye;        // xy: what the eye's place is past its half cell; z: base of the heights - the eye's; w: half cell
   vec4 detail;     // x: gamma / pixel error: metres of depth for a metre of error across the line of sight;
-                   // y: curvature, 1/metre; w: 1 for the published choices (needs.comp)
+                   // y: curvature, 1/metre; w: 1 for the published choices (factors.comp)
 } frame;
 layout(binding = 1) uniform usamplerBuffer draws;  // TileDraw of tile_seams.h, kDraw texels each
 layout(binding = 2) uniform samplerBuffer heights; // metres over the base; kVertices^2 a slot
 
-const int kCells = 64, kVertices = 65, kBlockCells = 8, kBlocks = 8, kDraw = 10, kBlock = 8, kCodeShift = 19;
+const int kCells = 64, kVertices = 65, kBlockCells = 8, kBlocks = 8, kDraw = 10;
 const uint kAlone = 0xffffffffu, kLarger = 0x80000000u, kSecondHalf = 0x40000000u, kFiner = 0x20000000u;
 const uint kNumber = 0x1fffffffu;
 const float kNoData = -1e7;  // instead of a draw's number: negative all over a triangle with such a vertex
@@ -48,19 +48,6 @@ int texel_of(int d, int slot, ivec2 at) {
 vec3 position_of(Draw draw, ivec2 at, float height) {
   const vec2 p = vec2(draw.first + at * draw.stride) * frame.eye.w - frame.eye.xy;
   return vec3(p, height + frame.eye.z - frame.detail.y * dot(p, p));
-}
-
-// Vertices of the mesh are named by their draw and their half cells there. The 9 x 9 of a block differ in their
-// low eight bits: by these llvmpipe finds those that it has already shaded.
-uint name_of(int d, ivec2 at) {
-  const uvec2 p = uvec2(at), far = p >> 5;
-  const uvec2 near = p >> 1 & 15, odd = p & 1;
-  return uint(d) << 16 | odd.y << 15 | odd.x << 14 | far.y << 11 | far.x << 8 | near.y << 4 | near.x;
-}
-int draw_named(uint name) { return int(name >> 16); }
-ivec2 half_cells_named(uint name) {
-  return ivec2((name >> 8 & 7) << 5 | (name & 15) << 1 | (name >> 14 & 1),
-               (name >> 11 & 7) << 5 | (name >> 4 & 15) << 1 | (name >> 15 & 1));
 }
 
 // In a fragment shader: metres from the eye. Cheaper than a varying: lavapipe sets each up for each triangle.

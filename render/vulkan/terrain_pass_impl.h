@@ -1,12 +1,11 @@
-// Draws tiles: three dispatches make a mesh of all of them, one indirect call draws it (another one those
-// with holes), and what is left of the picture is sky.
+// Draws tiles: two dispatches say how finely each block is tessellated, one indirect call draws all of them,
+// and what is left of the picture is sky.
 #pragma once
 
 #include <array>
 #include <map>
 #include <memory>
 #include <span>
-#include <vector>
 
 #include "blend/vulkan/pipeline_impl.h"
 #include "render/tile_seams.h"
@@ -28,23 +27,18 @@ class TerrainPass {
   TerrainPass(const Device::Impl& device, const TileStore& store, VkRenderPass pass,
               std::uint32_t most_tiles);
 
-  /// What is drawn from now on. REQUIRES: those with holes come last; nothing that uses it still runs.
+  /// What is drawn from now on; those with holes come last. REQUIRES: nothing that uses it still runs.
   void set(const FrameBlock& frame, std::span<const TileDraw> draws);
-  /// Outside of a render pass: the mesh of what was set.
-  void record_meshes(VkCommandBuffer commands) const;
-  static constexpr std::size_t kMeshDispatches = 3;
+  /// Outside of a render pass: factors for what was set.
+  void record_factors(VkCommandBuffer commands) const;
   /// How pixels are coloured from now on: pipelines are made when a set of effects is first met. REQUIRES: as
   /// for set.
   void use(const FrameEffects& effects);
   /// Inside of one, after use.
   void record_draws(VkCommandBuffer commands) const;
 
-  /// The names of the vertices of all triangles that were recorded last (terrain.glsl). Waits for the card.
-  std::vector<std::uint32_t> read_mesh(Commands& commands) const;
-
   std::size_t bytes_set() const { return bytes_set_; }  ///< by the last call
-  std::uint32_t tiles() const { return solid_ + holed_; }
-  std::uint32_t draws() const { return (solid_ > 0) + (holed_ > 0); }  ///< indirect ones
+  std::uint32_t draws() const { return solid_ + holed_; }
 
  private:
   // Of one set of effects; what it does not need is none.
@@ -54,18 +48,17 @@ class TerrainPass {
   };
   Pipelines make_pipelines(const FrameEffects& effects) const;
   void bind_all(const TileStore& store);
-  void reserve(std::size_t draws);
   const TileStore& store_;
   VkRenderPass pass_;
-  Bindings mesh_bindings_, bindings_;  // of the dispatches; of the draws
-  OwnedPipeline needs_pipeline_, edges_pipeline_, triangles_pipeline_;
+  Bindings factor_bindings_, bindings_;  // of the dispatches; of the draws
+  OwnedPipeline factors_pipeline_, edges_pipeline_;
   std::map<unsigned long, Pipelines> pipelines_;  // by the set of effects
   const Pipelines* used_ = nullptr;
   unsigned generation_ = 0;
-  VkDescriptorSet mesh_set_ = VK_NULL_HANDLE, set_ = VK_NULL_HANDLE;
-  OwnedSets mesh_sets_, sets_;
-  Buffer frame_, draws_, needs_, edges_, counts_, calls_, indices_;
-  OwnedView draw_texels_, need_texels_, edge_texels_, count_texels_;
+  VkDescriptorSet factor_set_ = VK_NULL_HANDLE, edge_set_ = VK_NULL_HANDLE, set_ = VK_NULL_HANDLE;
+  OwnedSets factor_sets_, edge_sets_, sets_;
+  Buffer frame_, draws_, factors_, edges_, calls_;
+  OwnedView draw_texels_, factor_texels_, edge_texels_;
   std::uint32_t solid_ = 0, holed_ = 0;
   std::size_t bytes_set_ = 0;
 };

@@ -94,7 +94,6 @@ struct TileMaker::Impl {
   double base;
   BlendOptions options;
   std::size_t memory;
-  bool published;
   std::unique_ptr<VulkanBlend> blend;
   vk::Bindings bindings;
   vk::OwnedPipeline finish;
@@ -105,7 +104,7 @@ struct TileMaker::Impl {
   TileMakerCounts counts;
 
   Impl(std::shared_ptr<Device> d, const Database& database, const TileLattice& l, vk::TileStore& s, double b,
-       const BlendOptions& k, std::size_t m, bool as_published)
+       const BlendOptions& k, std::size_t m)
       : device(std::move(d)),
         db(database),
         lattice(l),
@@ -113,7 +112,6 @@ struct TileMaker::Impl {
         base(b),
         options(k),
         memory(m),
-        published(as_published),
         bindings(device->impl(), kTypes, sizeof(FinishPush)),
         finish(make_finish()),
         sets(bindings.make_set(set)),
@@ -129,8 +127,8 @@ struct TileMaker::Impl {
   }
 
   vk::OwnedPipeline make_finish() const {
-    const std::uint32_t constants[] = {store.knowledge.has_value(), published};
-    return vk::make_pipeline(bindings, shaders::tile_finish(), constants);
+    const std::uint32_t knowing[] = {store.knowledge.has_value()};
+    return vk::make_pipeline(bindings, shaders::tile_finish(), knowing);
   }
   vk::Planes planes() const {
     return {.bound = true, .source = store.knowledge.has_value(), .gradient = true};
@@ -259,9 +257,8 @@ std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tile
 }
 
 TileMaker::TileMaker(std::shared_ptr<Device> device, const Database& db, const TileLattice& lattice,
-                     vk::TileStore& store, double base, const BlendOptions& blend, std::size_t memory,
-                     bool published)
-    : impl_(std::make_unique<Impl>(std::move(device), db, lattice, store, base, blend, memory, published)) {}
+                     vk::TileStore& store, double base, const BlendOptions& blend, std::size_t memory)
+    : impl_(std::make_unique<Impl>(std::move(device), db, lattice, store, base, blend, memory)) {}
 TileMaker::~TileMaker() = default;
 
 std::vector<TileMaker::Made> TileMaker::make(std::span<const TileKey> tiles, const TakeSlot& take_slot) {

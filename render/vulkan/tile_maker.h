@@ -33,8 +33,7 @@ class TileMaker {
 
   /// `base`: metres, what the heights in the slots are relative to. `memory`: bytes for patches on the card.
   TileMaker(std::shared_ptr<Device> device, const Database& db, const TileLattice& lattice,
-            vk::TileStore& store, double base, const BlendOptions& blend, std::size_t memory,
-            bool published = false);
+            vk::TileStore& store, double base, const BlendOptions& blend, std::size_t memory);
   ~TileMaker();
 
   /// Makes tiles of one level; take_slot is asked for each that has data, and ends the work where it has

@@ -25,18 +25,18 @@ Texture half_cells(const Device::Impl& device, std::uint32_t slots) {
 
 std::uint32_t TileStore::slots_within(const Device::Impl& device, std::size_t bytes, bool knowing) {
   const VkPhysicalDeviceLimits& limits = device.properties.limits;
-  const std::size_t most = std::min<std::size_t>(
-      {bytes / (kSlotBytes + knowing * kKnowledgeBytes), limits.maxImageArrayLayers,
-       limits.maxTexelBufferElements / kHeights, limits.maxStorageBufferRange / (kMostTriangles * 12)});
+  const std::size_t most =
+      std::min<std::size_t>({bytes / (kSlotBytes + knowing * kKnowledgeBytes), limits.maxImageArrayLayers,
+                             limits.maxTexelBufferElements / kHeights});
   return std::uint32_t(std::max<std::size_t>(most, 16));
 }
 
 TileStore::TileStore(const Device::Impl& device, std::uint32_t n, bool knowing)
     : slots(n),
       heights(device, 4 * kHeights * n, kUsage, Where::card),
-      blocks(device, kBlockBytes * kBlocks * n, kUsage, Where::card),
+      blocks(device, 32 * kBlocks * n, kUsage, Where::card),
       height_texels(texels(device, heights, VK_FORMAT_R32_SFLOAT)),
-      block_texels(texels(device, blocks, VK_FORMAT_R32G32B32A32_UINT)),
+      block_texels(texels(device, blocks, VK_FORMAT_R32G32B32A32_SFLOAT)),
       slopes(half_cells(device, n)),
       sampler(make_sampler(device)) {
   if (knowing) knowledge = half_cells(device, n);

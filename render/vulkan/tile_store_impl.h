@@ -10,14 +10,10 @@ namespace patchwork::vk {
 
 struct TileStore {
   static constexpr std::size_t kHeights = TileLattice::kVertices * TileLattice::kVertices;
-  static constexpr std::size_t kBlocks = 64;       ///< of 8 x 8 cells
-  static constexpr std::size_t kBlockBytes = 128;  ///< tile_finish.comp: kBlock texels
-  /// What a slot takes: heights, slopes as pairs of half floats, the facts of blocks.
+  static constexpr std::size_t kBlocks = 64;  ///< of 8 x 8 cells
+  /// What a slot takes: heights, slopes as pairs of half floats, eight numbers a block.
   static constexpr std::size_t kSlotBytes =
-      4 * kHeights + 4 * TileLattice::kSamples * TileLattice::kSamples + kBlockBytes * kBlocks;
-
-  /// Of a tile's mesh: 128 a block, and one more for each half cell that a finer neighbour adds to an edge.
-  static constexpr std::uint32_t kMostTriangles = 64 * 128 + 4 * 64;
+      4 * kHeights + 4 * TileLattice::kSamples * TileLattice::kSamples + 32 * kBlocks;
 
   static constexpr std::size_t kKnowledgeBytes = 4 * TileLattice::kSamples * TileLattice::kSamples;
 
@@ -27,7 +23,7 @@ struct TileStore {
   TileStore(const Device::Impl& device, std::uint32_t slots, bool knowing = false);
 
   std::uint32_t slots;
-  Buffer heights, blocks;  ///< terrain.glsl, needs.comp
+  Buffer heights, blocks;  ///< terrain.glsl, factors.comp
   OwnedView height_texels, block_texels;
   Texture slopes;                    ///< always in layout general: written by one shader, read by another
   std::optional<Texture> knowledge;  ///< of half cells: bound, source (as BlendOutput has it); as slopes are

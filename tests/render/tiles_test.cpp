@@ -344,35 +344,29 @@ TEST(EdgeSplit, WhoeverSharesAVertexReadsTheSameTexel) {
                  "vertices");
 }
 
-// Vertices of a border edge by what the block itself needs: bit p is cell p, 1 to 7.
-using Needs = std::vector<std::array<std::array<std::uint32_t, 8>, 4>>;  // by draw, side, block along it
-
-std::uint32_t spread(std::uint32_t bits, int by) {
-  std::uint32_t all = 0;
-  for (int p = 1; p < 8; ++p)
-    if (p * by < 16) all |= (bits >> p & 1) << p * by;
-  return all;
+// What a block at a border needs, whoever lies beyond.
+int own_need(const std::vector<std::array<int, 64>>& need, std::size_t d, int side, int along) {
+  const int end = (side & 1) * 7;
+  return need[d][std::size_t(side < 2 ? along * 8 + end : end * 8 + along)];
 }
 
-// edges.comp in C++: where a border edge is split, in half cells of its tile, from what blocks need.
-std::uint32_t border_split(const std::vector<TileDraw>& draws, const Needs& need, std::size_t d, int s,
-                           int along) {
-  const auto at = [&](std::size_t draw, int side, int k) {
-    return need[draw][std::size_t(side)][std::size_t(k)];
-  };
-  const std::uint32_t own = spread(at(d, s, along), 2);
+// edges.comp in C++: the segments of each border edge, in the terms of its tile, from what blocks need.
+int border_need(const std::vector<TileDraw>& draws, const std::vector<std::array<int, 64>>& need,
+                std::size_t d, int s, int along) {
+  const auto at = [&](std::size_t draw, int side, int k) { return own_need(need, draw, side, k); };
+  const int own = at(d, s, along);
   const std::uint32_t other = (along < 4 ? draws[d].beside_near : draws[d].beside_far)[std::size_t(s)];
   if (other == TileDraw::kAlone) return own;
   const std::size_t number = other & 0x1fffffffu;
   if (other & TileDraw::kFiner) {
     const int first = 2 * (along % 4);
-    return own | at(number, s ^ 1, first) | 1u << 8 | at(number, s ^ 1, first + 1) << 8;
+    return std::max(own, 2 * std::max(at(number, s ^ 1, first), at(number, s ^ 1, first + 1)));
   }
   if (other & TileDraw::kLarger) {
-    const std::uint32_t theirs = at(number, s ^ 1, (other & TileDraw::kSecondHalf ? 4 : 0) + along / 2);
-    return own | spread(along & 1 ? theirs >> 4 & ~1u : theirs & 0xf, 4);
+    const int theirs = (other & TileDraw::kSecondHalf ? 4 : 0) + along / 2;
+    return std::max(at(number, s ^ 1, theirs), 2 * std::max(own, at(d, s, along ^ 1))) / 2;
   }
-  return own | spread(at(number, s ^ 1, along), 2);
+  return std::max(own, at(number, s ^ 1, along));
 }
 
 TEST(EdgeSplit, EverySharedEdgeIsSplitAtTheSamePlaces) {
@@ -386,10 +380,9 @@ TEST(EdgeSplit, EverySharedEdgeIsSplitAtTheSamePlaces) {
     std::vector<TileDraw> draws;
     make_draws(woods.lattice(), s, woods.cache, {camera.eye.x, camera.eye.y}, draws);
     std::mt19937_64 random(seed + n);
-    Needs need(draws.size());
+    std::vector<std::array<int, 64>> need(draws.size());
     for (auto& tile : need)
-      for (auto& side : tile)
-        for (std::uint32_t& edge : side) edge = std::uint32_t(random()) & std::uint32_t(random()) & 0xfe;
+      for (int& b : tile) b = 1 << random() % 4;
     // Segments of shared lines: each must be there twice, from either side.
     using Place = std::pair<std::int64_t, std::int64_t>;
     std::map<std::pair<Place, Place>, int> segments, by_own_need;
@@ -399,16 +392,13 @@ TEST(EdgeSplit, EverySharedEdgeIsSplitAtTheSamePlaces) {
           const std::uint32_t other =
               (along < 4 ? draws[d].beside_near : draws[d].beside_far)[std::size_t(side)];
           if (other == TileDraw::kAlone) continue;
-          const auto split = [&](std::uint32_t at, auto& into) {
-            int from = 0;
-            for (int p = 1; p <= 16; ++p) {
-              if (p < 16 && (at >> p & 1) == 0) continue;
-              ++into[{place_of(draws[d], side, 16 * along + from), place_of(draws[d], side, 16 * along + p)}];
-              from = p;
-            }
+          const auto split = [&](int parts, auto& into) {
+            for (int k = 0; k < parts; ++k)
+              ++into[{place_of(draws[d], side, 16 * along + 16 * k / parts),
+                      place_of(draws[d], side, 16 * along + 16 * (k + 1) / parts)}];
           };
-          split(border_split(draws, need, d, side, along), segments);
-          split(spread(need[d][std::size_t(side)][std::size_t(along)], 2), by_own_need);
+          split(border_need(draws, need, d, side, along), segments);
+          split(own_need(need, d, side, along), by_own_need);
         }
     for (const auto& [segment, times] : segments) ASSERT_EQ(times, 2);
     edges += segments.size();

@@ -55,7 +55,9 @@ std::vector<std::uint32_t> grid_indices(int columns, int rows) {
 vk::OwnedPipeline triangles(const vk::Bindings& bindings, VkRenderPass pass,
                             std::span<const std::uint32_t> vert, std::span<const std::uint32_t> frag) {
   return vk::make_graphics(
-      bindings, pass, {.stages = {{VK_SHADER_STAGE_VERTEX_BIT, vert}, {VK_SHADER_STAGE_FRAGMENT_BIT, frag}}});
+      bindings, pass,
+      {.stages = {{VK_SHADER_STAGE_VERTEX_BIT, vert}, {VK_SHADER_STAGE_FRAGMENT_BIT, frag}},
+       .topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST});
 }
 
 // A grid as one mesh on the card.

@@ -1,17 +1,14 @@
 // What `patchwork cost` measures: rows of knobs, the uniform grid beside them, and what is made of both.
 #pragma once
 
-#include <chrono>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "blend/vulkan/device.h"
 #include "query/cost_model.h"
-#include "render/camera.h"
 #include "tools/bench/bench.h"
 #include "tools/cli.h"
+#include "tools/cost/rounds.h"
 
 namespace patchwork::cli {
 
@@ -20,8 +17,8 @@ struct CostOptions {
   std::vector<double> extent;  ///< xmin ymin xmax ymax; empty: all, or as much as kMostPatches allow
   std::string scene;     ///< a file; its camera is that of the views; empty: one over the south-west corner
   int side = 512;        ///< heights along each side of the picture
-  int runs = 5;          ///< measured at least; one more comes before to warm up
-  double seconds = 150;  ///< that all may take before it stays at `runs`
+  int runs = 6;          ///< measured at least, of which half count; one more comes before to warm up
+  double seconds = 240;  ///< that all may take before it stays at `runs`
   int points = 1 << 17;  ///< at which errors are measured
 };
 
@@ -31,13 +28,6 @@ inline constexpr std::size_t kMostPatches = 60000;
 /// Errors in the unit of a row: metres, or pixels of the view.
 struct ErrorFigures {
   double max = 0, p99 = 0, rms = 0;
-};
-
-/// Milliseconds of the stages, over the runs. What was not there to be measured has no values.
-struct Stages {
-  std::vector<double> query, fetch, blend, tessellate, draw, light;
-  std::vector<double> total() const;    ///< of each run
-  std::vector<double> at_hand() const;  ///< of each run, without fetch: patches are in memory
 };
 
 /// One setting of one knob.
@@ -62,28 +52,6 @@ struct Measurable {
   CostRow row;
   std::function<void(Stages&)> once;  ///< adds a run
 };
-/// Measures each in turn, A B C A B C, so that whatever disturbs the machine for a while disturbs all of
-/// them: once to warm up, `runs` times, and on until the median of each is known to kSure of itself, `until`
-/// has come, or kMostRuns were made. `progress` is told the share that is done.
-void measure(std::vector<Measurable>& all, int runs, std::chrono::steady_clock::time_point until,
-             const std::function<void(double)>& progress);
-inline constexpr double kSure = 0.015;  ///< standard error
-inline constexpr int kMostRuns = 100;
-
-/// A picture of the renderer.
-struct FrameScene {
-  Camera camera;
-  int smoothness = 1;
-  std::size_t memory = 0;  ///< bytes on the card
-};
-/// The scene's camera, the first of its path, or, without either, one over the south-west corner of the
-/// extent. Throws Error: the scene's file.
-FrameScene frame_scene(const Database& db, const Extent& extent, const std::string& scene_file,
-                       std::uint64_t memory);
-/// Pixel errors, ways of tessellating and directions of sky light: errors in pixels, measured against the
-/// best surface through each pixel's depth. Refers to `db`. Throws Error: a device that does not draw.
-std::vector<Measurable> frame_settings(const Database& db, std::shared_ptr<Device> device,
-                                       const FrameScene& scene);
 
 /// What a time buys: the finest step of the ladder whose median is at most `ms`.
 struct Bargain {

@@ -1,5 +1,7 @@
 // The knobs of a picture: pixel error, the way of tessellating and the directions of sky light, each frame
 // made from nothing.
+#include "tools/cost/frames.h"
+
 #include <fmt/format.h>
 
 #include <cmath>

@@ -12,15 +12,6 @@ namespace {
 
 constexpr double kTimes[] = {1, 5, 16, 33};  // milliseconds
 
-std::vector<double> sum(std::initializer_list<const std::vector<double>*> parts) {
-  std::vector<double> all;
-  for (const std::vector<double>* part : parts) {
-    all.resize(std::max(all.size(), part->size()));
-    for (std::size_t r = 0; r < part->size(); ++r) all[r] += (*part)[r];
-  }
-  return all;
-}
-
 // A column of the table of bargains: which rows, and what of their time.
 struct Column {
   std::string name, knob;
@@ -38,11 +29,6 @@ std::vector<Column> columns(int side) {
 }
 
 }  // namespace
-
-std::vector<double> Stages::total() const {
-  return sum({&query, &fetch, &blend, &tessellate, &draw, &light});
-}
-std::vector<double> Stages::at_hand() const { return sum({&query, &blend, &tessellate, &draw, &light}); }
 
 double median(const std::vector<double>& values) { return Spread::of(values).median; }
 

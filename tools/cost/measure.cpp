@@ -9,6 +9,7 @@
 #include "blend/vulkan/vulkan_blend.h"
 #include "db/error.h"
 #include "tools/cost/check_points.h"
+#include "tools/cost/frames.h"
 #include "tools/cost/uniform_grid.h"
 #include "tools/resampler.h"
 #include "tools/sample_dataset.h"
@@ -73,8 +74,18 @@ class Bench {
     uniform_grid(), frames(), tolerances();
     const auto until = start_ + std::chrono::round<std::chrono::steady_clock::duration>(
                                     std::chrono::duration<double>(o_.seconds));
-    measure(all_, o_.runs, until, [&](double share) { bar_.show(kGathering + (1 - kGathering) * share); });
-    for (Measurable& m : all_) report_.rows.push_back(std::move(m.row));
+    std::vector<MeasuredRun> runs;
+    for (const Measurable& m : all_) runs.push_back(m.once);
+    MemoryProbe memory;
+    std::vector<Stages> times = measure(
+        runs,
+        {.least = o_.runs, .until = until, .disturbance = std::ref(memory), .progress = [&](double share) {
+           bar_.show(kGathering + (1 - kGathering) * share);
+         }});
+    for (std::size_t k = 0; k < all_.size(); ++k) {
+      report_.rows.push_back(std::move(all_[k].row));
+      report_.rows.back().ms = std::move(times[k]);
+    }
     return std::move(report_);
   }
 

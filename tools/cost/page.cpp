@@ -143,9 +143,11 @@ std::string cost_page(const CostReport& c, const std::vector<std::pair<std::stri
   std::string page = kHead;
   page += "<h1>What accuracy costs in time</h1>\n";
   page += fmt::format(
-      "<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of {} runs or more.</p>\n", c.side,
-      c.side, figure((c.extent.xmax - c.extent.xmin) / 1e3), figure((c.extent.ymax - c.extent.ymin) / 1e3),
-      escaped(c.machine), c.threads, c.engine.empty() ? "" : ", graphics card " + escaped(c.engine), c.runs);
+      "<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of the calmer half of {} runs or "
+      "more: those before which the machine's memory was fastest.</p>\n",
+      c.side, c.side, figure((c.extent.xmax - c.extent.xmin) / 1e3),
+      figure((c.extent.ymax - c.extent.ymin) / 1e3), escaped(c.machine), c.threads,
+      c.engine.empty() ? "" : ", graphics card " + escaped(c.engine), c.runs);
   page += verdict(c);
   for (const std::string& n : c.notes) page += "<p>Note: " + escaped(n) + ".</p>\n";
   page +=

@@ -89,7 +89,9 @@ void add_cost(CLI::App& app, Common& common) {
   v->add_option("--scene", o->scene, "a scene whose camera and size the views and frames have")
       ->check(CLI::ExistingFile);
   v->add_option("--size", o->side, "heights along each side of the picture")->check(CLI::Range(64, 4096));
-  v->add_option("--runs", o->runs, "measured runs of each setting, at least")->check(CLI::Range(1, 100));
+  v->add_option("--runs", o->runs,
+                "measured runs of each setting, at least; the half with the machine at its calmest counts")
+      ->check(CLI::Range(1, 100));
   v->add_option("--seconds", o->seconds, "up to which runs are added until the medians are sure")
       ->check(CLI::NonNegativeNumber);
   v->add_option("--points", o->points, "at which errors are measured")->check(CLI::Range(100, 100'000'000));

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 
 #include "blend/vulkan/vulkan_blend.h"
@@ -47,8 +48,23 @@ void ProgressBar::show(double share) {
   std::fputs(line.c_str(), stderr);
 }
 
+CLI::Validator above_zero() {
+  return {[](const std::string& s) {
+            return std::strtod(s.c_str(), nullptr) > 0 ? "" : std::string("it must be above 0");
+          },
+          "above 0"};
+}
+
+CLI::Validator zero_or_more() {
+  return {[](const std::string& s) {
+            return std::strtod(s.c_str(), nullptr) >= 0 ? "" : std::string("it must be 0 or more");
+          },
+          "0 or more"};
+}
+
 void SurfaceOptions::add_to(CLI::App& v) {
-  v.add_option("--error", error, "largest error that you accept, metres; 0 means the best there is");
+  v.add_option("--error", error, "largest error that you accept, metres; 0 means the best there is")
+      ->check(zero_or_more());
   v.add_option("--smoothness", smoothness, "k: derivatives that are continuous")->check(CLI::Range(0, 2));
   v.add_option("--blend", blend, "how patches are composed")->check(CLI::IsMember({"priority", "weighted"}));
   v.add_option("--engine", engine, "where the surface is evaluated")->check(CLI::IsMember({"cpu", "vulkan"}));
@@ -96,6 +112,11 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 Json to_json(const Extent& e) { return {e.xmin, e.ymin, e.xmax, e.ymax}; }
+std::string to_text(const Extent& e) {
+  const auto millimetres = [](double v) { return std::round(v * 1000) / 1000 + 0.0; };  // -0 becomes 0
+  return fmt::format("{:.3f} {:.3f} {:.3f} {:.3f}", millimetres(e.xmin), millimetres(e.ymin),
+                     millimetres(e.xmax), millimetres(e.ymax));
+}
 
 Json by_level(const Extraction& x) {
   std::map<int, std::size_t> counts;

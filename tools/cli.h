@@ -49,6 +49,10 @@ void add_bench(CLI::App& app, Common& common);
 /// A subcommand with the common options.
 CLI::App* verb(CLI::App& app, Common& common, const std::string& name, const std::string& what);
 
+/// Checks of an option's number; what is no number does not pass.
+CLI::Validator above_zero();
+CLI::Validator zero_or_more();
+
 /// A bar with share, rate and remaining time on stderr: on a terminal, when the work lasts longer than a
 /// second.
 class ProgressBar {
@@ -96,6 +100,8 @@ void print(const Json& document);
 void note(const Common& common, const std::string& text);
 double seconds_since(std::chrono::steady_clock::time_point start);
 Json to_json(const Extent& e);
+/// xmin ymin xmax ymax to a millimetre.
+std::string to_text(const Extent& e);
 /// Counts of an extraction by level and by grid name.
 Json by_level(const Extraction& x);
 Json by_grid(const Database& db, const Extraction& x);

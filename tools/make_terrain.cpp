@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "db/error.h"
+#include "tools/cli.h"
 #include "tools/raster_field.h"
 #include "tools/terrain_function.h"
 #include "tools/terrain_writer.h"
@@ -39,17 +40,17 @@ struct Arguments {
 void declare(CLI::App& app, Arguments& a) {
   app.add_option("OUTDIR", a.directory, "where base.tif, survey_1.tif ... and terrain.json go")->required();
   app.add_option("--size", a.size, "samples along each side of the base")->check(CLI::Range(2, 65537));
-  app.add_option("--step", a.step, "metres between samples of the base")->check(CLI::PositiveNumber);
+  app.add_option("--step", a.step, "metres between samples of the base")->check(cli::above_zero());
   app.add_option("--origin", a.origin, "south-west sample of the base, metres")->expected(2);
   app.add_option("--crs", a.format.crs, "of every file; \"\" for none");
   app.add_option("--seed", a.seed, "of the terrain and of everything random");
-  app.add_option("--relief", a.relief, "metres between plains and summits")->check(CLI::NonNegativeNumber);
-  app.add_option("--cliffs", a.cliff, "metres, height of the cliffs")->check(CLI::NonNegativeNumber);
+  app.add_option("--relief", a.relief, "metres between plains and summits")->check(cli::zero_or_more());
+  app.add_option("--cliffs", a.cliff, "metres, height of the cliffs")->check(cli::zero_or_more());
   app.add_option("--type", a.format.type, "of the samples")
       ->check(CLI::IsMember({"Int16", "UInt16", "Int32", "Float32"}));
   app.add_option("--scale", a.format.quantum, "metres per unit of the integer types")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--noise", a.noise, "metres, bound of the base's noise")->check(CLI::NonNegativeNumber);
+      ->check(cli::above_zero());
+  app.add_option("--noise", a.noise, "metres, bound of the base's noise")->check(cli::zero_or_more());
   app.add_option("--holes", a.holes, "share of samples without data")->check(CLI::Range(0., 0.3));
   app.add_option(
          "--survey", a.surveys,
@@ -61,8 +62,8 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--from", a.from, "take the heights of this file instead; writes no base")
       ->check(CLI::ExistingFile);
   app.add_option("--detail", a.detail, "metres, bound of the detail added to --from")
-      ->check(CLI::NonNegativeNumber);
-  app.add_option("--threads", a.threads, "0: all")->check(CLI::NonNegativeNumber);
+      ->check(cli::zero_or_more());
+  app.add_option("--threads", a.threads, "0: all")->check(cli::zero_or_more());
   app.add_flag("--json", a.as_json, "print terrain.json instead of a table");
 }
 

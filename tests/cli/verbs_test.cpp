@@ -65,6 +65,24 @@ TEST_F(Verbs, WrongUsageExitsWithTwo) {
   EXPECT_EQ(run({"list", db, "--threads", "1", "--memory", "64MiB"}).code, 0);
 }
 
+TEST_F(Verbs, NumbersOutOfTheirRangeAreWrongUsage) {
+  const std::string db = hill_database(), out = in_directory("out.tif");
+  for (const Words& words : {Words{"query", db, "--error"}, Words{"query", db, "--patches"},
+                             Words{"sample", db, "--error"}, Words{"resample", db, out, "--step"}}) {
+    const auto with = [&](const char* number) {
+      Words all = words;
+      all.push_back(number);
+      return run(all);
+    };
+    for (const char* number : {"-5", "nan"}) {
+      const Outcome o = with(number);
+      EXPECT_EQ(o.code, 2) << Json(words).dump() << number;
+      EXPECT_SAYS(o.err, words.back() + ": it must be");
+    }
+    EXPECT_EQ(with("5").code, 0) << Json(words).dump() << ", negative control";
+  }
+}
+
 TEST_F(Verbs, ImportTellsProgramsWhatItDid) {
   const std::string file = make(hill_file()), db = in_directory("new.pwk");
   const Outcome o = run({"import", db, file, "--json"});

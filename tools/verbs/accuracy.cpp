@@ -109,7 +109,7 @@ void add_accuracy(CLI::App& app, Common& common) {
        "--step", o->step,
        "between the points that are looked at, metres; else the grids' finest step, or what makes four "
        "million points")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   v->add_option("--map", o->map, "also writes the bounds as a GeoTIFF");
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });

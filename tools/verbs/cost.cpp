@@ -93,7 +93,7 @@ void add_cost(CLI::App& app, Common& common) {
                 "measured runs of each setting, at least; the half with the machine at its calmest counts")
       ->check(CLI::Range(1, 100));
   v->add_option("--seconds", o->seconds, "up to which runs are added until the medians are sure")
-      ->check(CLI::NonNegativeNumber);
+      ->check(zero_or_more());
   v->add_option("--points", o->points, "at which errors are measured")->check(CLI::Range(100, 100'000'000));
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });

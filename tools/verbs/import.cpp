@@ -78,8 +78,7 @@ std::string text_of(const ImportReport& r, bool dry_run, const std::optional<Com
       "{}: {} {} patches ({} redundant), {} of other grids hidden, {} shortened; accuracy {:g} m; {:.2f} s",
       r.name, dry_run ? "would add" : "added", r.patches, r.dormant, r.hidden, r.lowered, r.accuracy,
       r.seconds.total);
-  text += fmt::format("\n  where: {:.3f} {:.3f} {:.3f} {:.3f}", r.extent.xmin, r.extent.ymin, r.extent.xmax,
-                      r.extent.ymax);
+  text += "\n  where: " + to_text(r.extent);
   if (compared)
     text += fmt::format(
         "\n  against what is there: offset {:+.2f} m, tilt {:+.3f} m/km in x and {:+.3f} m/km in y, spread "
@@ -165,7 +164,7 @@ void add_import(CLI::App& app, Common& common) {
   v->add_option("--replace", o->replace, "a grid of the database that goes out as this one comes in");
   v->add_option("--tolerance", o->tolerance,
                 "metres by which a stored height may differ from the file's; 0 keeps them exactly")
-      ->check(CLI::NonNegativeNumber);
+      ->check(zero_or_more());
   v->add_option("--crs", o->crs, "CRS of a new database, e.g. EPSG:32610; projected, in metres");
   v->add_option("--band", o->raster.band, "band that holds the heights, from 1");
   v->add_option("--nodata", o->raster.nodata, "a further value that means no data (may be repeated)")

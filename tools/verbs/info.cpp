@@ -79,10 +79,7 @@ Json describe(const Database& db) {
 void print_info(const Database& db, const Json& j) {
   fmt::print("{}\n  CRS {}, content {}\n", db.path(), short_crs(db.crs()),
              j["content_hash"].get<std::string>());
-  if (!db.grids().empty()) {
-    const Extent e = db.extent();
-    fmt::print("  extent {:.3f} {:.3f} {:.3f} {:.3f}\n", e.xmin, e.ymin, e.xmax, e.ymax);
-  }
+  if (!db.grids().empty()) fmt::print("  extent {}\n", to_text(db.extent()));
   fmt::print("  {} patches, {} of them redundant; smallest error available {:.4g} m\n",
              j["patches"].get<std::size_t>(), j["dormant"].get<std::size_t>(),
              j["error_available"].get<double>());

@@ -67,7 +67,7 @@ void add_profile(CLI::App& app, Common& common) {
   v->add_option("DB", o->database, "the database")->required();
   v->add_option("--line", o->line, "\"x y, x y, ...\" or WKT, in the database's CRS")->required();
   v->add_option("--step", o->step, "between points, metres at most; else the finest step of the grids there")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   o->surface.add_to(*v);
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });

@@ -197,19 +197,23 @@ void add_query(CLI::App& app, Common& common) {
   auto o = std::make_shared<Options>();
   CLI::App* v = verb(app, common, "query", "the patches that an error needs, and what finding them costs");
   v->add_option("DB", o->database, "the database")->required();
-  v->add_option("--error", o->error, "largest error that you accept, metres; 0 means the best there is");
+  v->add_option("--error", o->error, "largest error that you accept, metres; 0 means the best there is")
+      ->check(zero_or_more());
   auto* eye = v->add_option("--eye", o->eye, "where a view is seen from: x y z, metres")->expected(3);
   v->add_option("--look", o->look, "the point in the middle of the view: x y z")->expected(3)->needs(eye);
   eye->needs("--look");
   v->add_option("--fov", o->fov, "vertical field of view, degrees");
   v->add_option("--size", o->size, "of the view: width height, pixels")->expected(2);
-  v->add_option("--pixel-error", o->pixel_error, "largest error that you accept on the screen, pixels");
+  v->add_option("--pixel-error", o->pixel_error, "largest error that you accept on the screen, pixels")
+      ->check(zero_or_more());
   v->add_flag("--cone", o->cone, "distances in space, not in the plane: fewer patches for an eye high above")
       ->needs(eye);
-  v->add_option("--patches", o->patches, "a budget: the smallest error that needs no more patches");
-  v->add_option("--bytes", o->bytes, "a budget: the smallest error whose samples take no more memory");
+  v->add_option("--patches", o->patches, "a budget: the smallest error that needs no more patches")
+      ->check(zero_or_more());
+  v->add_option("--bytes", o->bytes, "a budget: the smallest error whose samples take no more memory")
+      ->check(zero_or_more());
   v->add_option("--milliseconds", o->milliseconds, "a budget: the smallest error that is found in this time")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->excludes("--patches")
       ->excludes("--bytes");
   v->add_option("--field", o->field, "a raster of errors, metres, that each place may have")

@@ -195,11 +195,11 @@ void add_render(CLI::App& app, Common& common) {
       ->expected(2)
       ->check(CLI::Range(1, 16384));
   v->add_option("--pixel-error", o->pixel_error, "largest error on the screen, pixels; else the scene's")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   v->add_option("--depth", o->depth, "also writes metres along each pixel's ray (GeoTIFF)");
   v->add_option("--follow", o->follow,
                 "seconds: another picture, OUT_0001.png, ..., for each change of the database")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   v->add_flag("--stats", o->stats, "what each frame cost and reached, as JSON");
   v->add_flag("--published", o->published, "tessellates as published, without the guarantee: for comparison");
   v->add_flag("--json", common.json, "one JSON document on stdout");

@@ -181,9 +181,7 @@ void add_resample(CLI::App& app, Common& common) {
   o->surface.add_to(*v);
   o->region.add_to(*v, false);
   v->add_option("--step", o->step, "of a pixel, metres; else the finest step of the grids there")
-      ->check([](const std::string& s) {
-        return std::strtod(s.c_str(), nullptr) > 0 ? "" : std::string("it must be above 0");
-      });
+      ->check(above_zero());
   v->add_option("--bands", o->bands, "height,bound,source (source: grid number, negative where filled)")
       ->delimiter(',')
       ->check(CLI::IsMember({"height", "bound", "source"}));

@@ -163,7 +163,7 @@ void add_sight(CLI::App& app, Common& common) {
   auto* from = v->add_option("--from", o->from, "the eye: x y h, h in metres above the ground")->expected(3);
   auto* to = v->add_option("--to", o->to, "what it looks at: x y h")->expected(3)->needs(from);
   auto* distance = v->add_option("--distance", o->distance, "of a ray, metres along the ground")
-                       ->check(CLI::PositiveNumber)
+                       ->check(above_zero())
                        ->needs(from)
                        ->excludes(to);
   v->add_option("--azimuth", o->azimuth, "of a ray, degrees clockwise from the y axis")->needs(distance);
@@ -171,14 +171,15 @@ void add_sight(CLI::App& app, Common& common) {
       ->check(CLI::Range(-89.9, 89.9))
       ->needs(distance);
   v->add_flag("--absolute", o->absolute, "h are heights as the database has them, not above the ground");
-  v->add_flag("!--flat", o->air.curved, "without the earth's curvature");
+  v->add_flag_callback(
+      "--flat", [o] { o->air.curved = false; }, "without the earth's curvature");
   v->add_option("--refraction", o->air.refraction, "curvature of light over the earth's")
       ->capture_default_str();
   v->add_option("--radius", o->air.radius, "of the earth, metres")
-      ->check(CLI::PositiveNumber)
+      ->check(above_zero())
       ->capture_default_str();
   v->add_option("--error", o->error, "largest error that you accept, metres; 0 means the best there is")
-      ->check(CLI::NonNegativeNumber);
+      ->check(zero_or_more());
   v->add_option("--smoothness", o->smoothness, "k: derivatives that are continuous")->check(CLI::Range(0, 2));
   v->add_option("--blend", o->blend, "how patches are composed")
       ->check(CLI::IsMember({"priority", "weighted"}));

@@ -59,8 +59,8 @@ void add_view(CLI::App& app, Common& common) {
       ->expected(2)
       ->check(CLI::Range(1, 16384));
   v->add_option("--pixel-error", o->pixel_error, "largest error on the screen, pixels; else the scene's")
-      ->check(CLI::PositiveNumber);
-  v->add_option("--frames", o->frames, "ends after so many frames")->check(CLI::PositiveNumber);
+      ->check(above_zero());
+  v->add_option("--frames", o->frames, "ends after so many frames")->check(above_zero());
   v->add_option("--screenshot", o->screenshot, "a PNG of what the window shows when it ends");
   v->add_flag("--validation", o->validation, "Vulkan's validation layer watches; what it says is a failure")
       ->group("");

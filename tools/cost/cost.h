@@ -50,7 +50,7 @@ struct CostRow {
 /// A setting whose facts are known, and how its time is taken.
 struct Measurable {
   CostRow row;
-  std::function<void(Stages&)> once;  ///< adds a run
+  MeasuredRun once;
 };
 
 /// What a time buys: the finest step of the ladder whose median is at most `ms`.

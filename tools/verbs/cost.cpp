@@ -88,13 +88,19 @@ void add_cost(CLI::App& app, Common& common) {
       ->expected(4);
   v->add_option("--scene", o->scene, "a scene whose camera and size the views and frames have")
       ->check(CLI::ExistingFile);
-  v->add_option("--size", o->side, "heights along each side of the picture")->check(CLI::Range(64, 4096));
+  v->add_option("--size", o->side, "heights along each side of the picture")
+      ->check(CLI::Range(64, 4096))
+      ->capture_default_str();
   v->add_option("--runs", o->runs,
                 "measured runs of each setting, at least; the half with the machine at its calmest counts")
-      ->check(CLI::Range(1, 100));
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
   v->add_option("--seconds", o->seconds, "up to which runs are added until the medians are sure")
-      ->check(zero_or_more());
-  v->add_option("--points", o->points, "at which errors are measured")->check(CLI::Range(100, 100'000'000));
+      ->check(zero_or_more())
+      ->capture_default_str();
+  v->add_option("--points", o->points, "at which errors are measured")
+      ->check(CLI::Range(100, 100'000'000))
+      ->capture_default_str();
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });
 }

@@ -76,12 +76,10 @@ class Bench {
                                     std::chrono::duration<double>(o_.seconds));
     std::vector<MeasuredRun> runs;
     for (const Measurable& m : all_) runs.push_back(m.once);
-    MemoryProbe memory;
-    std::vector<Stages> times = measure(
-        runs,
-        {.least = o_.runs, .until = until, .disturbance = std::ref(memory), .progress = [&](double share) {
-           bar_.show(kGathering + (1 - kGathering) * share);
-         }});
+    std::vector<Stages> times =
+        measure(runs, {.least = o_.runs, .until = until, .progress = [&](double share) {
+                         bar_.show(kGathering + (1 - kGathering) * share);
+                       }});
     for (std::size_t k = 0; k < all_.size(); ++k) {
       report_.rows.push_back(std::move(all_[k].row));
       report_.rows.back().ms = std::move(times[k]);

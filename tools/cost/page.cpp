@@ -143,8 +143,8 @@ std::string cost_page(const CostReport& c, const std::vector<std::pair<std::stri
   std::string page = kHead;
   page += "<h1>What accuracy costs in time</h1>\n";
   page += fmt::format(
-      "<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of the calmer half of {} runs or "
-      "more: those before which the machine's memory was fastest.</p>\n",
+      "<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of the fastest quarter of {} runs or "
+      "more: what slows others is whatever else the machine does.</p>\n",
       c.side, c.side, figure((c.extent.xmax - c.extent.xmin) / 1e3),
       figure((c.extent.ymax - c.extent.ymin) / 1e3), escaped(c.machine), c.threads,
       c.engine.empty() ? "" : ", graphics card " + escaped(c.engine), c.runs);

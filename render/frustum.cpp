@@ -35,7 +35,7 @@ Frustum::Frustum(const Camera& camera, double curvature, double far)
 }
 
 // Over the part of the picture where the box may be; convex there, so largest in a corner. REQUIRES: all of
-// the box is ahead. factors.comp does the same.
+// the box is ahead. blocks.glsl does the same.
 double Frustum::stretch_in(const Box3& b) const {
   double x[2] = {INFINITY, -INFINITY}, y[2] = {INFINITY, -INFINITY};
   for (int k = 0; k < 8; ++k) {

@@ -54,15 +54,30 @@ vk::LightBudget light_budget(const RendererOptions& o) {
   return o.realtime ? vk::LightBudget{.ms = 4, .rays = 8192} : vk::LightBudget{};
 }
 
-bool knowing(const SceneEffects& e) { return e.error || e.source; }
+// The options with a way to tessellate that the device has.
+RendererOptions resolved(RendererOptions o, const Device::Impl& device) {
+  const bool mesh = device.features.fullDrawIndexUint32 != 0;
+  if (o.tessellation == Tessellation::mesh && !mesh)
+    throw Error("tessellation", "the device has no vertices with numbers of 32 bits, as a mesh needs",
+                "hardware does without");
+  if (!o.tessellation) {
+    const bool cpu = device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+    o.tessellation = cpu && mesh ? Tessellation::mesh : Tessellation::hardware;
+  }
+  return o;
+}
+
+vk::TileStore::Holds holds(const RendererOptions& o) {
+  return {.knowledge = o.effects.error || o.effects.source, .meshes = o.tessellation == Tessellation::mesh};
+}
 
 }  // namespace
 
 struct Renderer::Impl {
   std::shared_ptr<Device> device;
   const Database& db;
-  RendererOptions options;
   const Device::Impl& card;
+  RendererOptions options;
   TileLattice lattice;
   double base;
   vk::TileStore store;
@@ -82,12 +97,12 @@ struct Renderer::Impl {
   Impl(std::shared_ptr<Device> d, const Database& database, const RendererOptions& o)
       : device(std::move(d)),
         db(database),
-        options(o),
         card(drawing(*device)),
+        options(resolved(o, card)),
         lattice(TileLattice::over(db)),
         base(middle_height(db)),
-        store(card, vk::TileStore::slots_within(card, o.memory / 2, knowing(o.effects)), knowing(o.effects)),
-        supply(device, db, lattice, store, base, o),
+        store(card, vk::TileStore::slots_within(card, o.memory / 2, holds(options)), holds(options)),
+        supply(device, db, lattice, store, base, options),
         target(card, std::uint32_t(o.width), std::uint32_t(o.height)),
         terrain(card, store, target.pass(), supply.most_tiles()),
         effects(card, db, scene_of(o)),
@@ -124,7 +139,7 @@ struct Renderer::Impl {
     b.eye[1] = float(camera.eye.y - (lattice.origin().y + cell[1] * lattice.half_cell()));
     b.eye[2] = float(base - camera.eye.z), b.eye[3] = float(lattice.half_cell());
     b.detail[0] = float(camera.gamma() / options.pixel_error), b.detail[1] = float(curvature);
-    b.detail[3] = options.published;
+    b.detail[3] = options.tessellation == Tessellation::published;
     return b;
   }
 
@@ -141,7 +156,7 @@ struct Renderer::Impl {
     stats.sky_dispatches = effects.sky_dispatches() - skies;
     terrain.use(effects);
     timer.mark(c);
-    terrain.record_factors(c);
+    stats.dispatches += terrain.record_subdivision(c) + stats.shadow_dispatches + stats.sky_dispatches;
     timer.mark(c);
     const float background[4] = {float(options.background.r) / 255, float(options.background.g) / 255,
                                  float(options.background.b) / 255, 1};
@@ -154,8 +169,7 @@ struct Renderer::Impl {
     commands.submit(), commands.wait();
     const std::vector<double> ms = timer.intervals();
     stats.light_ms = ms[0], stats.factors_ms = ms[1], stats.draw_ms = ms[2];
-    stats.dispatches += (terrain.draws() > 0 ? 2 : 0) + stats.shadow_dispatches + stats.sky_dispatches;
-    stats.draws = terrain.draws();
+    stats.draws = terrain.subdivision().draws();
     if (counter)
       card.check(vkGetQueryPoolResults(card.get(), counter.get(), 0, 1, 8, &stats.triangles, 8,
                                        VK_QUERY_RESULT_64_BIT | VK_QUERY_RESULT_WAIT_BIT),
@@ -224,7 +238,7 @@ Image Renderer::picture() const {
 void Renderer::draw_legend(Image& picture) const { impl_->effects.draw_legend(picture); }
 
 void Renderer::change(const SceneEffects& to) {
-  if (knowing(to) && !impl_->store.knowledge)
+  if ((to.error || to.source) && !impl_->store.holds.knowledge)
     throw Error("effects", "this renderer was made without overlays of bounds and sources");
   impl_->options.effects = to;
   impl_->effects.change(scene_of(impl_->options));
@@ -264,6 +278,16 @@ bool Renderer::refresh(Database& db) {
 }
 
 Renderer::Drawn Renderer::drawn() const { return {impl_->store, impl_->block, impl_->draws}; }
+Tessellation Renderer::tessellation() const { return *impl_->options.tessellation; }
+
+std::vector<Renderer::MeshVertex> Renderer::mesh() const {
+  std::vector<MeshVertex> mesh;
+  for (const std::uint32_t n :
+       impl_->terrain.subdivision().read_names(impl_->commands))  // mesh.glsl: name_of
+    mesh.push_back({n >> 16, std::int32_t((n >> 8 & 7) << 5 | (n & 15) << 1 | (n >> 14 & 1)),
+                    std::int32_t((n >> 11 & 7) << 5 | (n >> 4 & 15) << 1 | (n >> 15 & 1))});
+  return mesh;
+}
 
 void Renderer::reshape(int width, int height, double pixel_error) {
   RendererOptions& o = impl_->options;

@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,6 +24,14 @@ class Target;
 struct TileStore;
 }  // namespace vk
 
+/// How tiles become triangles that keep to the pixel error. Each may be drawn as any other: pictures agree to
+/// within twice that error.
+enum class Tessellation {
+  hardware,   ///< the card's stages, block by block: vulkan/tessellation.cpp
+  mesh,       ///< compute shaders, vertex by vertex, fewer triangles but more work a tile: vulkan/mesh.cpp
+  published,  ///< hardware as it was published, without the guarantee: vulkan/factors.comp
+};
+
 struct RendererOptions {
   int width = 1280, height = 720;  ///< pixels
   double pixel_error = 1;          ///< pixels
@@ -37,7 +46,8 @@ struct RendererOptions {
   bool realtime = false;
   double make_ms = 8;
   int workers = 1;
-  bool published = false;     ///< tessellation as published, without the guarantee (vulkan/factors.comp)
+  /// None: the mesh where the device is a CPU, which draws it in about two thirds of the time; else hardware.
+  std::optional<Tessellation> tessellation = {};
   SceneEffects effects = {};  ///< what is not there costs no shader, buffer or dispatch
   bool legend = true;         ///< drawn into picture() where an effect has a scale
 };
@@ -93,6 +103,15 @@ class Renderer {
     std::span<const TileDraw> draws;
   };
   Drawn drawn() const;
+  Tessellation tessellation() const;
+  /// A vertex of a mesh: which of drawn().draws, and its half cells there.
+  struct MeshVertex {
+    std::uint32_t draw;
+    std::int32_t x, y;
+  };
+  /// Three for each triangle of the last frame, seen or clipped, counterclockwise from above; none but with
+  /// Tessellation::mesh.
+  std::vector<MeshVertex> mesh() const;
   /// From the next frame on: another size of the picture (pixels, at least 1 x 1), another error. Tiles stay.
   void reshape(int width, int height, double pixel_error);
   /// Onto a picture of any size: what picture() has of a legend.

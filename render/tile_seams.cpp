@@ -54,7 +54,9 @@ class SeamMaker {
       distance_[k] = std::hypot(std::max({e.xmin - eye_.x, eye_.x - e.xmax, 0.0}),
                                 std::max({e.ymin - eye_.y, eye_.y - e.ymax, 0.0}));
     }
+    const auto holes = [&](std::uint32_t k) { return node(selection_.leaves[k].key).facts.holes; };
     std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
+      if (holes(a) != holes(b)) return holes(b);
       return distance_[a] != distance_[b] ? distance_[a] < distance_[b] : a < b;
     });
     draw_of_.assign(selection_.leaves.size(), TileDraw::kAlone);

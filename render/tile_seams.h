@@ -41,7 +41,8 @@ struct TileDraw {
 };
 static_assert(sizeof(TileDraw) == 10 * 16);
 
-/// A draw for each drawn leaf, nearest to the eye first. `draws` is overwritten.
+/// A draw for each drawn leaf: those without holes, then those with some, nearest to the eye first. `draws`
+/// is overwritten.
 void make_draws(const TileLattice& lattice, const Selection& selection, const TileCache& cache, Point eye,
                 std::vector<TileDraw>& draws);
 

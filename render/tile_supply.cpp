@@ -31,7 +31,8 @@ TileSupply::TileSupply(std::shared_ptr<Device> device, const Database& db, const
       options_(options),
       cache_(store.slots, options.policy),
       maker_(std::move(device), db, lattice, store, base,
-             {.smoothness = options.smoothness, .composition = options.composition}, options.memory / 2),
+             {.smoothness = options.smoothness, .composition = options.composition}, options.memory / 2,
+             options.tessellation == Tessellation::published),
       most_tiles_(store.slots * 2 / 3) {
   if (options.realtime)
     fetcher_ = std::make_unique<TileFetcher>(

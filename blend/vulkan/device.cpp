@@ -116,6 +116,7 @@ VkPhysicalDeviceFeatures drawing_features(VkPhysicalDevice device, std::uint32_t
   if (!has.shaderStorageImageExtendedFormats) missing = "its shaders write no images of two channels";
   use.tessellationShader = has.tessellationShader, use.multiDrawIndirect = has.multiDrawIndirect;
   use.drawIndirectFirstInstance = has.drawIndirectFirstInstance;
+  use.fullDrawIndexUint32 = has.fullDrawIndexUint32;
   use.shaderStorageImageExtendedFormats = has.shaderStorageImageExtendedFormats;
   use.pipelineStatisticsQuery = has.pipelineStatisticsQuery, use.fillModeNonSolid = has.fillModeNonSolid;
   return use;

@@ -4,7 +4,7 @@
 #include "terrain.glsl"
 #include "effects.glsl"
 
-layout(location = 0) in vec4 local;  // terrain.tese
+layout(location = 0) in vec4 local;  // terrain.glsl: Vertex
 layout(location = 0) out vec4 color;
 layout(binding = 4) uniform sampler2DArray slopes;  // dh/dx, dh/dy at half cells
 

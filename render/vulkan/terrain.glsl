@@ -1,5 +1,7 @@
 // What the shaders of the terrain share: the frame, the drawn tiles, and where a vertex lies. Positions are
 // metres relative to the eye.
+#ifndef TERRAIN_GLSL
+#define TERRAIN_GLSL
 
 layout(binding = 0) uniform FrameBlock {
   mat4 clip;       // of positions relative to the eye
@@ -50,8 +52,24 @@ vec3 position_of(Draw draw, ivec2 at, float height) {
   return vec3(p, height + frame.eye.z - frame.detail.y * dot(p, p));
 }
 
+// For the last stage before triangles are set up: clip coordinates, and what the fragments are told.
+struct Vertex {
+  vec4 place;
+  vec4 local;  // xy: in the tile, 0 to 1; z: the draw, kNoData without data; w: the slot
+};
+// At half cells `at` of a draw: its height comes from the tile that owns it.
+Vertex vertex_at(int d, ivec2 at) {
+  const Draw draw = draw_at(d);
+  const float height = texelFetch(heights, texel_of(d, draw.slot, at)).x;
+  const bool valid = !isnan(height);
+  return Vertex(frame.clip * vec4(position_of(draw, at, valid ? height : 0), 1),
+                vec4(vec2(at) / float(2 * kCells), valid ? float(d) : kNoData, float(draw.slot)));
+}
+
 // In a fragment shader: metres from the eye. Cheaper than a varying: lavapipe sets each up for each triangle.
 vec3 place_at(vec4 pixel) {
   const float x = pixel.x * frame.right.w - 1, y = 1 - pixel.y * frame.up.w;
   return (frame.axis.xyz + x * frame.right.xyz + y * frame.up.xyz) / pixel.w;
 }
+
+#endif

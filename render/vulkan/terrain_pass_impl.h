@@ -1,5 +1,5 @@
-// Draws tiles: two dispatches say how finely each block is tessellated, one indirect call draws all of them,
-// and what is left of the picture is sky.
+// Draws tiles: dispatches say how each block is divided, one indirect call draws all of them (another one
+// those with holes), and what is left of the picture is sky.
 #pragma once
 
 #include <array>
@@ -10,6 +10,7 @@
 #include "blend/vulkan/pipeline_impl.h"
 #include "render/tile_seams.h"
 #include "render/vulkan/frame_effects_impl.h"
+#include "render/vulkan/subdivision_impl.h"
 #include "render/vulkan/target_impl.h"
 #include "render/vulkan/tile_store_impl.h"
 
@@ -27,10 +28,10 @@ class TerrainPass {
   TerrainPass(const Device::Impl& device, const TileStore& store, VkRenderPass pass,
               std::uint32_t most_tiles);
 
-  /// What is drawn from now on; those with holes come last. REQUIRES: nothing that uses it still runs.
+  /// What is drawn from now on. REQUIRES: those with holes come last; nothing that uses it still runs.
   void set(const FrameBlock& frame, std::span<const TileDraw> draws);
-  /// Outside of a render pass: factors for what was set.
-  void record_factors(VkCommandBuffer commands) const;
+  /// Outside of a render pass: how what was set is divided. Returns how many dispatches that takes.
+  std::size_t record_subdivision(VkCommandBuffer commands) const;
   /// How pixels are coloured from now on: pipelines are made when a set of effects is first met. REQUIRES: as
   /// for set.
   void use(const FrameEffects& effects);
@@ -38,7 +39,7 @@ class TerrainPass {
   void record_draws(VkCommandBuffer commands) const;
 
   std::size_t bytes_set() const { return bytes_set_; }  ///< by the last call
-  std::uint32_t draws() const { return solid_ + holed_; }
+  const Subdivision& subdivision() const { return *subdivision_; }
 
  private:
   // Of one set of effects; what it does not need is none.
@@ -47,18 +48,17 @@ class TerrainPass {
     OwnedPipeline sky;
   };
   Pipelines make_pipelines(const FrameEffects& effects) const;
-  void bind_all(const TileStore& store);
   const TileStore& store_;
   VkRenderPass pass_;
-  Bindings factor_bindings_, bindings_;  // of the dispatches; of the draws
-  OwnedPipeline factors_pipeline_, edges_pipeline_;
+  Bindings bindings_;
   std::map<unsigned long, Pipelines> pipelines_;  // by the set of effects
   const Pipelines* used_ = nullptr;
   unsigned generation_ = 0;
-  VkDescriptorSet factor_set_ = VK_NULL_HANDLE, edge_set_ = VK_NULL_HANDLE, set_ = VK_NULL_HANDLE;
-  OwnedSets factor_sets_, edge_sets_, sets_;
-  Buffer frame_, draws_, factors_, edges_, calls_;
-  OwnedView draw_texels_, factor_texels_, edge_texels_;
+  VkDescriptorSet set_ = VK_NULL_HANDLE;
+  OwnedSets sets_;
+  Buffer frame_, draws_;
+  OwnedView draw_texels_;
+  std::unique_ptr<Subdivision> subdivision_;
   std::uint32_t solid_ = 0, holed_ = 0;
   std::size_t bytes_set_ = 0;
 };

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kSide = TileLattice::kSamples + 2;  // with the halo
 constexpr std::uint32_t kMost = 64;               // tiles of a submission
-constexpr std::uint32_t kSummary = 8;             // floats of a tile: tile_finish.comp
+constexpr std::uint32_t kSummary = 8;             // floats of a tile: tile_finish.glsl
 constexpr VkDescriptorType kTypes[] = {
     VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
     VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
@@ -94,6 +94,7 @@ struct TileMaker::Impl {
   double base;
   BlendOptions options;
   std::size_t memory;
+  bool published;
   std::unique_ptr<VulkanBlend> blend;
   vk::Bindings bindings;
   vk::OwnedPipeline finish;
@@ -104,7 +105,7 @@ struct TileMaker::Impl {
   TileMakerCounts counts;
 
   Impl(std::shared_ptr<Device> d, const Database& database, const TileLattice& l, vk::TileStore& s, double b,
-       const BlendOptions& k, std::size_t m)
+       const BlendOptions& k, std::size_t m, bool as_published)
       : device(std::move(d)),
         db(database),
         lattice(l),
@@ -112,6 +113,7 @@ struct TileMaker::Impl {
         base(b),
         options(k),
         memory(m),
+        published(as_published),
         bindings(device->impl(), kTypes, sizeof(FinishPush)),
         finish(make_finish()),
         sets(bindings.make_set(set)),
@@ -127,12 +129,11 @@ struct TileMaker::Impl {
   }
 
   vk::OwnedPipeline make_finish() const {
-    const std::uint32_t knowing[] = {store.knowledge.has_value()};
-    return vk::make_pipeline(bindings, shaders::tile_finish(), knowing);
+    const std::uint32_t constants[] = {store.holds.knowledge, published};
+    return vk::make_pipeline(bindings, store.holds.meshes ? shaders::mesh_finish() : shaders::tile_finish(),
+                             constants);
   }
-  vk::Planes planes() const {
-    return {.bound = true, .source = store.knowledge.has_value(), .gradient = true};
-  }
+  vk::Planes planes() const { return {.bound = true, .source = store.holds.knowledge, .gradient = true}; }
 
   void use(const std::vector<PatchId>& patches) {
     const std::uint64_t before = blend ? blend->pool().traffic().bytes : 0;
@@ -257,8 +258,9 @@ std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tile
 }
 
 TileMaker::TileMaker(std::shared_ptr<Device> device, const Database& db, const TileLattice& lattice,
-                     vk::TileStore& store, double base, const BlendOptions& blend, std::size_t memory)
-    : impl_(std::make_unique<Impl>(std::move(device), db, lattice, store, base, blend, memory)) {}
+                     vk::TileStore& store, double base, const BlendOptions& blend, std::size_t memory,
+                     bool published)
+    : impl_(std::make_unique<Impl>(std::move(device), db, lattice, store, base, blend, memory, published)) {}
 TileMaker::~TileMaker() = default;
 
 std::vector<TileMaker::Made> TileMaker::make(std::span<const TileKey> tiles, const TakeSlot& take_slot) {

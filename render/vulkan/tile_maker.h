@@ -17,7 +17,7 @@ struct TileStore;
 
 struct TileMakerCounts {
   std::uint64_t tiles = 0, patches = 0, bytes = 0;  ///< made; sent to the card
-  std::uint64_t dispatches = 0;                     ///< of tile_finish.comp
+  std::uint64_t dispatches = 0;                     ///< of tile_finish.glsl
   BlendCounts blended;                              ///< of all samples of the tiles made
   double extract_ms = 0, send_ms = 0, blend_ms = 0, finish_ms = 0;
 };
@@ -32,8 +32,9 @@ class TileMaker {
   using TakeSlot = std::function<std::uint32_t()>;
 
   /// `base`: metres, what the heights in the slots are relative to. `memory`: bytes for patches on the card.
+  /// `published`: blocks are measured as published too.
   TileMaker(std::shared_ptr<Device> device, const Database& db, const TileLattice& lattice,
-            vk::TileStore& store, double base, const BlendOptions& blend, std::size_t memory);
+            vk::TileStore& store, double base, const BlendOptions& blend, std::size_t memory, bool published);
   ~TileMaker();
 
   /// Makes tiles of one level; take_slot is asked for each that has data, and ends the work where it has

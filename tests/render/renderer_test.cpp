@@ -1,10 +1,15 @@
 // Pictures of the terrain against the blend itself: error on the screen, cracks, the near plane, what is made
 // anew.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <map>
+#include <numeric>
 #include <random>
+#include <set>
 
 #include "render/renderer.h"
+#include "render/tile_seams.h"
 #include "tests/blend/vulkan_scene.h"
 #include "tests/hard_case.h"
 #include "tests/render/ray_cast.h"
@@ -14,19 +19,23 @@ namespace {
 
 constexpr int kWidth = 256, kHeight = 144;
 
+// Those that keep to what is asked.
+constexpr std::pair<const char*, Tessellation> kWays[] = {{"hardware", Tessellation::hardware},
+                                                          {"mesh", Tessellation::mesh}};
+
 class TerrainTest : public VulkanTest {
  protected:
   static void SetUpTestSuite() { land_ = std::make_unique<Land>(surveys()); }
   static void TearDownTestSuite() { land_.reset(); }
   static const Database& db() { return land_->db(); }
-  static Renderer renderer(double pixel_error, bool published = false) {
+  static Renderer renderer(double pixel_error, std::optional<Tessellation> tessellation = {}) {
     return {test_device(),
             db(),
             {.width = kWidth,
              .height = kHeight,
              .pixel_error = pixel_error,
              .memory = std::size_t{256} << 20,
-             .published = published}};
+             .tessellation = tessellation}};
   }
   static std::unique_ptr<Land> land_;
 };
@@ -72,26 +81,46 @@ ScreenError screen_error(const Blend& best, const Camera& camera, const std::vec
 }
 
 TEST_F(TerrainTest, TessellationError) {
-  std::mt19937_64 random(test_seed(21));
   const Extraction x = extract(db(), {.error = 0});
   const Blend best(db(), x.patches, {.smoothness = 1});
-  std::size_t pixels = 0;
-  for (const double tau : {0.5, 1.0, 2.0, 4.0}) {
-    Renderer r = renderer(tau);
-    double worst = 0;
-    for (int n = 0; n < 12; ++n) {
-      const Camera camera = random_camera(db(), random);
-      const FrameStats stats = r.draw(camera);
-      EXPECT_LE(stats.pixels_reached, tau) << "all of the terrain is there";
-      EXPECT_EQ(stats.tiles_wanted, 0u);
-      const ScreenError e = screen_error(best, camera, r.depth());
-      EXPECT_LE(e.worst, tau * 1.001 + 0.01) << "tau " << tau << " view " << n;
-      worst = std::max(worst, e.worst), pixels += e.pixels;
+  for (const auto& [name, way] : kWays) {
+    std::mt19937_64 random(test_seed(21));
+    std::size_t pixels = 0;
+    for (const double tau : {0.5, 1.0, 2.0, 4.0}) {
+      Renderer r = renderer(tau, way);
+      double worst = 0;
+      for (int n = 0; n < 12; ++n) {
+        const Camera camera = random_camera(db(), random);
+        const FrameStats stats = r.draw(camera);
+        EXPECT_LE(stats.pixels_reached, tau) << "all of the terrain is there";
+        EXPECT_EQ(stats.tiles_wanted, 0u);
+        const ScreenError e = screen_error(best, camera, r.depth());
+        EXPECT_LE(e.worst, tau * 1.001 + 0.01) << name << ", tau " << tau << " view " << n;
+        worst = std::max(worst, e.worst), pixels += e.pixels;
+      }
+      report_case("TessellationError", fmt::format("{}, asked {} px, 12 views", name, tau), 12, worst,
+                  tau * 1.001 + 0.01, "px");
     }
-    report_case("TessellationError", "asked " + std::to_string(tau) + " px, 12 views", 12, worst,
-                tau * 1.001 + 0.01, "px");
+    EXPECT_GT(pixels, 100000u);
   }
-  EXPECT_GT(pixels, 100000u);
+}
+
+TEST_F(TerrainTest, AMeshShowsWhatHardwareShows) {
+  std::mt19937_64 random(test_seed(26));
+  Renderer hardware = renderer(1, Tessellation::hardware), mesh = renderer(1, Tessellation::mesh);
+  std::uint64_t triangles = 0, fewer = 0;
+  for (int n = 0; n < 6; ++n) {
+    const Camera camera = random_camera(db(), random);
+    triangles += hardware.draw(camera).triangles, fewer += mesh.draw(camera).triangles;
+    const std::vector<float> a = hardware.depth(), b = mesh.depth();
+    std::size_t apart = 0;
+    for (std::size_t k = 0; k < a.size(); ++k) apart += std::isnan(a[k]) != std::isnan(b[k]);
+    EXPECT_LE(apart, std::size_t(4 * (kWidth + kHeight))) << "outlines differ by a pixel";
+  }
+  EXPECT_GT(fewer, 0u);
+  EXPECT_LT(fewer, triangles);
+  EXPECT_TRUE(hardware.mesh().empty());
+  EXPECT_EQ(mesh.tessellation(), Tessellation::mesh);
 }
 
 // The published choices look at a block's middle, where the nearest point is nearer.
@@ -107,10 +136,13 @@ TEST_F(TerrainTest, TessellationAsPublishedExceedsWhatWasAsked) {
   const Blend best(rough.db(), x.patches, {.smoothness = 1});
   RendererOptions options{
       .width = kWidth, .height = kHeight, .pixel_error = 2, .memory = std::size_t{256} << 20};
-  Renderer ours(test_device(), rough.db(), options);
-  options.published = true;
-  Renderer published(test_device(), rough.db(), options);
-  double worst = 0, most = 0;
+  const auto with = [&](Tessellation way) {
+    options.tessellation = way;
+    return Renderer(test_device(), rough.db(), options);
+  };
+  Renderer hardware = with(Tessellation::hardware), mesh = with(Tessellation::mesh),
+           published = with(Tessellation::published);
+  double worst = 0, most[2] = {0, 0};
   for (int n = 0; n < 30; ++n) {
     Camera camera = random_camera(rough.db(), random);
     Points below;
@@ -120,46 +152,114 @@ TEST_F(TerrainTest, TessellationAsPublishedExceedsWhatWasAsked) {
     if (ground.source[0] == 0) continue;
     const double lower = camera.eye.z - ground.height[0] - 20 - 4 * n;
     camera.eye.z -= lower, camera.look.z -= lower;
-    published.draw(camera), ours.draw(camera);
+    published.draw(camera);
     worst = std::max(worst, screen_error(best, camera, published.depth()).worst);
-    const double guaranteed = screen_error(best, camera, ours.depth()).worst;
-    EXPECT_LE(guaranteed, 2.01);
-    most = std::max(most, guaranteed);
+    for (const int k : {0, 1}) {
+      Renderer& ours = k ? mesh : hardware;
+      ours.draw(camera);
+      const double guaranteed = screen_error(best, camera, ours.depth()).worst;
+      EXPECT_LE(guaranteed, 2.01) << kWays[k].first;
+      most[k] = std::max(most[k], guaranteed);
+    }
   }
-  report_case("TessellationError", "asked 2 px on rough ground, low eyes", 30, most, 2.01, "px");
+  for (const int k : {0, 1})
+    report_case("TessellationError", fmt::format("{}, asked 2 px on rough ground, low eyes", kWays[k].first),
+                30, most[k], 2.01, "px");
   report_control("TessellationError", "factors as published, the same views", 30, worst, 2.01, "px");
 }
 
 TEST_F(TerrainTest, NoBackgroundInsideTheSilhouette) {
-  std::mt19937_64 random(test_seed(23));
   const Extraction x = extract(db(), {.error = 0});
   const Blend best(db(), x.patches, {.smoothness = 1});
   const CastSurface surface = surface_of(db(), x.patches, best, 1);
   constexpr int kColumns = 128, kRows = 72, kRim = 2;  // the outline of the data is drawn to a pixel
-  Renderer r(test_device(), db(), {.width = kColumns, .height = kRows, .memory = std::size_t{128} << 20});
-  std::size_t inside = 0, outside = 0, cracks = 0, ghosts = 0;
+  std::mt19937_64 random(test_seed(23));
+  std::vector<Camera> cameras;
+  std::vector<std::vector<Hit>> hits;
   for (int n = 0; n < 4; ++n) {
-    Camera camera = random_camera(db(), random);
-    camera.width = kColumns, camera.height = kRows;
-    r.draw(camera);
-    const std::vector<float> depth = r.depth();
-    const std::vector<Hit> hits = cast(surface, camera);
-    for (int row = kRim; row + kRim < kRows; ++row)
-      for (int c = kRim; c + kRim < kColumns; ++c) {
-        int covered = 0;
-        for (int y = -kRim; y <= kRim; ++y)
-          for (int w = -kRim; w <= kRim; ++w)
-            covered += hits[std::size_t((row + y) * kColumns + c + w)].covered;
-        const bool drawn = !std::isnan(depth[std::size_t(row * kColumns + c)]);
-        const bool all = covered == (2 * kRim + 1) * (2 * kRim + 1), none = covered == 0;
-        inside += all, outside += none;
-        cracks += all && !drawn, ghosts += none && drawn;
-      }
+    cameras.push_back(random_camera(db(), random));
+    cameras.back().width = kColumns, cameras.back().height = kRows;
+    hits.push_back(cast(surface, cameras.back()));
   }
-  report_case("EdgeSplit", "background inside the silhouette, pixels", inside, double(cracks), 0, "pixels");
-  EXPECT_EQ(ghosts, 0u);
-  EXPECT_GT(inside, 4000u);
-  EXPECT_GT(outside, 100u);
+  for (const auto& [name, way] : kWays) {
+    Renderer r(test_device(), db(),
+               {.width = kColumns, .height = kRows, .memory = std::size_t{128} << 20, .tessellation = way});
+    std::size_t inside = 0, outside = 0, cracks = 0, ghosts = 0;
+    for (std::size_t n = 0; n < cameras.size(); ++n) {
+      r.draw(cameras[n]);
+      const std::vector<float> depth = r.depth();
+      for (int row = kRim; row + kRim < kRows; ++row)
+        for (int c = kRim; c + kRim < kColumns; ++c) {
+          int covered = 0;
+          for (int y = -kRim; y <= kRim; ++y)
+            for (int w = -kRim; w <= kRim; ++w)
+              covered += hits[n][std::size_t((row + y) * kColumns + c + w)].covered;
+          const bool drawn = !std::isnan(depth[std::size_t(row * kColumns + c)]);
+          const bool all = covered == (2 * kRim + 1) * (2 * kRim + 1), none = covered == 0;
+          inside += all, outside += none;
+          cracks += all && !drawn, ghosts += none && drawn;
+        }
+    }
+    report_case("EdgeSplit", fmt::format("{}, background inside the silhouette, pixels", name), inside,
+                double(cracks), 0, "pixels");
+    EXPECT_EQ(ghosts, 0u);
+    EXPECT_GT(inside, 4000u);
+    EXPECT_GT(outside, 100u);
+  }
+}
+
+// Of a frame's mesh: a vertex inside an edge of a triangle would tear it open.
+struct Seams {
+  std::size_t edges = 0, torn = 0, levels = 0;
+  std::map<std::pair<std::uint32_t, int>, std::int64_t> area;  // half cells^2, twice; by draw and block
+};
+
+Seams seams_of(const std::vector<Renderer::MeshVertex>& mesh, std::span<const TileDraw> draws) {
+  using Place = std::array<std::int64_t, 2>;
+  const auto place = [&](std::uint32_t d, std::int64_t x, std::int64_t y) {
+    return Place{draws[d].x + x * draws[d].stride, draws[d].y + y * draws[d].stride};
+  };
+  std::set<Place> vertices;
+  std::set<std::uint32_t> strides;
+  for (const auto& v : mesh) vertices.insert(place(v.draw, v.x, v.y)), strides.insert(draws[v.draw].stride);
+  Seams s;
+  s.levels = strides.size();
+  for (std::size_t t = 0; t < mesh.size(); t += 3) {
+    const Renderer::MeshVertex *a = &mesh[t], *b = a + 1, *c = a + 2;
+    const int x = (a->x + b->x + c->x) / 48, y = (a->y + b->y + c->y) / 48;
+    const std::int64_t twice =
+        std::int64_t(b->x - a->x) * (c->y - a->y) - std::int64_t(c->x - a->x) * (b->y - a->y);
+    EXPECT_GT(twice, 0);
+    s.area[{a->draw, 8 * y + x}] += twice;
+    for (int k = 0; k < 3; ++k) {
+      const Renderer::MeshVertex &from = mesh[t + std::size_t(k)], &to = mesh[t + std::size_t((k + 1) % 3)];
+      const int parts = std::gcd(to.x - from.x, to.y - from.y);
+      ++s.edges;
+      for (int p = 1; p < parts; ++p)
+        s.torn += vertices.contains(
+            place(from.draw, from.x + (to.x - from.x) / parts * p, from.y + (to.y - from.y) / parts * p));
+    }
+  }
+  return s;
+}
+
+TEST_F(TerrainTest, AMeshCoversEachBlockOnceAndNoVertexLiesInsideAnEdge) {
+  std::mt19937_64 random(test_seed(25));
+  std::size_t edges = 0, torn = 0, levels = 0;
+  for (const double tau : {0.5, 2.0, 8.0}) {
+    Renderer r = renderer(tau, Tessellation::mesh);
+    for (int n = 0; n < 8; ++n) {
+      const FrameStats stats = r.draw(random_camera(db(), random));
+      const auto mesh = r.mesh();
+      EXPECT_LE(stats.triangles, mesh.size() / 3);
+      const Seams s = seams_of(mesh, r.drawn().draws);
+      for (const auto& [block, twice] : s.area) EXPECT_EQ(twice, 2 * 16 * 16);
+      edges += s.edges, torn += s.torn, levels = std::max(levels, s.levels);
+    }
+  }
+  EXPECT_GT(edges, 50000u);
+  EXPECT_GT(levels, 3u);
+  report_case("EdgeSplit", "edges of 24 meshes with a vertex inside", edges, double(torn), 0, "edges");
 }
 
 // An eye inside the boxes of tiles, a hand above the ground, looking down, and looking away from everything.
@@ -210,7 +310,8 @@ TEST_F(TerrainTest, WithNothingChangedNothingIsSentOrDispatched) {
   Camera moved = camera;
   moved.eye.x += 1;
   const FrameStats third = r.draw(moved);
-  EXPECT_EQ(third.dispatches, 2u) << "a step of the camera costs factors and edges alone";
+  EXPECT_EQ(third.dispatches, r.tessellation() == Tessellation::mesh ? 3u : 2u)
+      << "a step of the camera costs how blocks are divided alone";
   EXPECT_EQ(third.tiles_made, 0u);
 }
 
@@ -361,39 +462,45 @@ TEST_F(InsertionTest, OneFarAwayChangesNoPixel) {
 // Two hundred views, with a survey more after each dozen: old and new tiles side by side keep to what was
 // asked.
 TEST_F(InsertionTest, TessellationErrorWhileSurveysComeIn) {
-  std::mt19937_64 random(test_seed(24));
-  double worst = 0;  // in the pixels asked for
-  for (const double tau : {0.5, 1.0, 2.0, 4.0}) {
-    GridFolder folder;
-    {
-      Database writer = folder.database();
-      folder.add(writer, surveys()[0], "base");
-    }
-    Database db = Database::open(folder.path("grids.patchwork"));
-    Renderer r(test_device(), db,
-               {.width = kWidth, .height = kHeight, .pixel_error = tau, .memory = std::size_t{128} << 20});
-    Extraction x = extract(db, {.error = 0});
-    auto best = std::make_unique<Blend>(db, x.patches, BlendOptions{.smoothness = 1});
-    for (int n = 0; n < 50; ++n) {
-      if (n % 12 == 11 && n / 12 < 3) {
+  for (const auto& [name, way] : kWays) {
+    std::mt19937_64 random(test_seed(24));
+    double worst = 0;  // in the pixels asked for
+    for (const double tau : {0.5, 1.0, 2.0, 4.0}) {
+      GridFolder folder;
+      {
         Database writer = folder.database();
-        folder.add(writer, surveys()[std::size_t(n / 12 + 1)], "survey" + std::to_string(n));
-        best.reset();
-        ASSERT_TRUE(r.refresh(db));
-        x = extract(db, {.error = 0});
-        best = std::make_unique<Blend>(db, x.patches, BlendOptions{.smoothness = 1});
+        folder.add(writer, surveys()[0], "base");
       }
-      const Camera camera = random_camera(db, random);
-      const FrameStats stats = r.draw(camera);
-      EXPECT_LE(stats.pixels_reached, tau);
-      const double error = screen_error(*best, camera, r.depth()).worst;
-      EXPECT_LE(error, tau * 1.001 + 0.01) << "tau " << tau << " view " << n;
-      worst = std::max(worst, error / tau);
+      Database db = Database::open(folder.path("grids.patchwork"));
+      Renderer r(test_device(), db,
+                 {.width = kWidth,
+                  .height = kHeight,
+                  .pixel_error = tau,
+                  .memory = std::size_t{128} << 20,
+                  .tessellation = way});
+      Extraction x = extract(db, {.error = 0});
+      auto best = std::make_unique<Blend>(db, x.patches, BlendOptions{.smoothness = 1});
+      for (int n = 0; n < 50; ++n) {
+        if (n % 12 == 11 && n / 12 < 3) {
+          Database writer = folder.database();
+          folder.add(writer, surveys()[std::size_t(n / 12 + 1)], "survey" + std::to_string(n));
+          best.reset();
+          ASSERT_TRUE(r.refresh(db));
+          x = extract(db, {.error = 0});
+          best = std::make_unique<Blend>(db, x.patches, BlendOptions{.smoothness = 1});
+        }
+        const Camera camera = random_camera(db, random);
+        const FrameStats stats = r.draw(camera);
+        EXPECT_LE(stats.pixels_reached, tau);
+        const double error = screen_error(*best, camera, r.depth()).worst;
+        EXPECT_LE(error, tau * 1.001 + 0.01) << name << ", tau " << tau << " view " << n;
+        worst = std::max(worst, error / tau);
+      }
+      EXPECT_EQ(r.cache().find_violation(), "");
     }
-    EXPECT_EQ(r.cache().find_violation(), "");
+    report_case("TessellationError", fmt::format("{}, views while three surveys come in", name), 200, worst,
+                1.021, "of the pixels asked");
   }
-  report_case("TessellationError", "views while three surveys come in", 200, worst, 1.021,
-              "of the pixels asked");
 }
 
 TEST_F(InsertionTest, InRealTimeAFlightReachesTheSamePicture) {

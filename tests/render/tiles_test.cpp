@@ -350,7 +350,8 @@ int own_need(const std::vector<std::array<int, 64>>& need, std::size_t d, int si
   return need[d][std::size_t(side < 2 ? along * 8 + end : end * 8 + along)];
 }
 
-// edges.comp in C++: the segments of each border edge, in the terms of its tile, from what blocks need.
+// factor_edges.comp in C++: the segments of each border edge, in the terms of its tile, from what blocks
+// need.
 int border_need(const std::vector<TileDraw>& draws, const std::vector<std::array<int, 64>>& need,
                 std::size_t d, int s, int along) {
   const auto at = [&](std::size_t draw, int side, int k) { return own_need(need, draw, side, k); };

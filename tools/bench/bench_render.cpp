@@ -1,4 +1,5 @@
-// A flight at several pixel errors, each frame also drawn as the whole mesh, as chunks, and as published.
+// A flight at several pixel errors, each frame also drawn as the whole mesh, as chunks, by the other way to
+// tessellate, and as published.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -35,7 +36,7 @@ Flight flight_over(const Database& db, int frames) {
 
 // Times of one flight, a column for each way of drawing.
 struct Times {
-  std::vector<double> frame, ours, published, mesh, chunked, screen, bare;
+  std::vector<double> frame, other_frame, ours, other, published, mesh, chunked, screen, bare;
   std::vector<double> triangles, made;
   double pixels = 0;
 };
@@ -57,7 +58,10 @@ class Flights {
   std::vector<Work> fly(int width, int height, double pixel_error) {
     RendererOptions options{.width = width, .height = height, .pixel_error = pixel_error};
     Renderer ours(device_, db_, options);
-    options.published = true;
+    const bool mesh = ours.tessellation() == Tessellation::mesh;
+    options.tessellation = mesh ? Tessellation::hardware : Tessellation::mesh;
+    Renderer other(device_, db_, options);
+    options.tessellation = Tessellation::published;
     Renderer published(device_, db_, options);
     RenderPeers peers(device_, db_, mesh_, width, height);
     const CameraPath path(flight_over(db_, frames_));
@@ -68,6 +72,8 @@ class Flights {
       t.frame.push_back(s.total_ms), t.ours.push_back(s.factors_ms + s.draw_ms);
       t.triangles.push_back(double(s.triangles)), t.made.push_back(double(s.tiles_made));
       if (k > 0) t.pixels = std::max(t.pixels, s.pixels_reached);
+      const FrameStats a = other.draw(camera);
+      t.other_frame.push_back(a.total_ms), t.other.push_back(a.factors_ms + a.draw_ms);
       const FrameStats p = published.draw(camera);
       t.published.push_back(p.factors_ms + p.draw_ms);
       t.chunked.push_back(peers.chunked(ours));
@@ -75,14 +81,15 @@ class Flights {
       t.bare.push_back(t.screen.back() + peers.plain(ours, s.triangles));
       if (mesh_) t.mesh.push_back(peers.full_mesh(camera));
     }
-    return works(t, fmt::format("{} x {} at {:g} px", width, height, pixel_error));
+    return works(t, fmt::format("{} x {} at {:g} px", width, height, pixel_error),
+                 mesh ? "hardware tessellation" : "mesh by compute");
   }
 
  private:
   // The first frame makes all tiles, and is not one of the flight.
   static Spread spread(const std::vector<double>& v) { return Spread::of({v.begin() + 1, v.end()}); }
 
-  std::vector<Work> works(const Times& t, const std::string& name) const {
+  std::vector<Work> works(const Times& t, const std::string& name, const std::string& other) const {
     const Json answer{{"device", device_->name()},
                       {"frames", t.ours.size() - 1},
                       {"triangles_median", quantile(t.triangles, 0.5)},
@@ -93,10 +100,12 @@ class Flights {
     Work draw{"draw " + name, "ms", true, spread(t.ours), {}, answer};
     if (!t.mesh.empty()) draw.peers.emplace_back("full mesh", spread(t.mesh));
     draw.peers.emplace_back("chunked", spread(t.chunked));
+    draw.peers.emplace_back(other, spread(t.other));
     draw.peers.emplace_back("published", spread(t.published));
     draw.peers.emplace_back("full screen", spread(t.screen));
     draw.peers.emplace_back("full screen + plain", spread(t.bare));
     Work frame{"frame " + name + ", tiles made", "ms", true, spread(t.frame), {}, answer};
+    frame.peers.emplace_back(other, spread(t.other_frame));
     return {draw, frame};
   }
 

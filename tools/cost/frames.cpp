@@ -25,15 +25,17 @@ constexpr int kDirections[] = {4, 8, 16};
 struct FrameKnob {
   std::string knob, value;
   double pixel_error;
-  bool published = false;
+  Tessellation tessellation = Tessellation::hardware;  // these are first frames, whose tiles are all made
   SceneEffects effects = {};
 };
 
 std::vector<FrameKnob> all_knobs() {
   std::vector<FrameKnob> all;
   for (const double pixels : kFrameErrors) all.push_back({"frame", fmt::format("{:g}", pixels), pixels});
-  for (const bool published : {false, true})
-    all.push_back({"tessellation", published ? "published" : "conservative", kTessellated, published});
+  for (const auto& [name, way] : {std::pair{"hardware", Tessellation::hardware},
+                                  {"mesh", Tessellation::mesh},
+                                  {"published", Tessellation::published}})
+    all.push_back({"tessellation", name, kTessellated, way});
   all.push_back({"sky_directions", "no sky light", kTessellated});
   for (const int n : kDirections) {
     all.push_back({"sky_directions", std::to_string(n), kTessellated});
@@ -56,7 +58,7 @@ class Frames {
     row.samples = double(scene_.camera.width) * scene_.camera.height, row.file_bytes = db_.file_bytes();
     Renderer renderer = renderer_of(k);
     const FrameStats s = renderer.draw(scene_.camera);
-    judge(renderer, s, k.published, row);
+    judge(renderer, s, row);
     return row;
   }
   void once(const FrameKnob& k, Stages& ms) const { add(renderer_of(k).draw(scene_.camera), ms); }
@@ -69,7 +71,7 @@ class Frames {
                      .pixel_error = k.pixel_error,
                      .smoothness = scene_.smoothness,
                      .memory = scene_.memory,
-                     .published = k.published,
+                     .tessellation = k.tessellation,
                      .effects = k.effects});
   }
 
@@ -104,10 +106,10 @@ class Frames {
     return all;
   }
 
-  void judge(const Renderer& renderer, const FrameStats& s, bool published, CostRow& row) const {
+  void judge(const Renderer& renderer, const FrameStats& s, CostRow& row) const {
     std::vector<double> off = distances(renderer.depth());
     row.patches = s.patches_sent, row.bytes = s.bytes_up;
-    if (!published) {
+    if (renderer.tessellation() != Tessellation::published) {
       row.bound = row.bound_p99 = s.pixels_reached;
       for (const double d : off) row.beyond += d > s.pixels_reached * kRoundingPart + kRoundingPixels;
     }

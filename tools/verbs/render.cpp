@@ -3,6 +3,8 @@
 #include <gdal_priv.h>
 
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <thread>
 
 #include "db/error.h"
@@ -18,7 +20,8 @@ struct Options {
   std::string database, out, scene, depth;
   std::vector<int> size;
   double pixel_error = 0, follow = 0;
-  bool stats = false, published = false;
+  std::optional<Tessellation> tessellation;
+  bool stats = false;
 };
 
 // DIR/NAME.EXT of frame 7 of a path is DIR/NAME_0007.EXT.
@@ -110,7 +113,9 @@ Json summary(const Total& t, const Scene& scene, const std::string& device, doub
 
 RendererOptions options_of(const Scene& scene, const Options& o, const Common& common) {
   RendererOptions r = renderer_options(scene, common.memory);
-  r.published = o.published;
+  r.tessellation = o.tessellation;
+  // A mesh takes more to make of each tile, and wins where tiles are drawn again.
+  if (!r.tessellation && !scene.path && o.follow == 0) r.tessellation = Tessellation::hardware;
   return r;
 }
 
@@ -201,7 +206,14 @@ void add_render(CLI::App& app, Common& common) {
                 "seconds: another picture, OUT_0001.png, ..., for each change of the database")
       ->check(above_zero());
   v->add_flag("--stats", o->stats, "what each frame cost and reached, as JSON");
-  v->add_flag("--published", o->published, "tessellates as published, without the guarantee: for comparison");
+  static const std::map<std::string, Tessellation> kWays{{"hardware", Tessellation::hardware},
+                                                         {"mesh", Tessellation::mesh},
+                                                         {"published", Tessellation::published}};
+  v->add_option(
+       "--tessellation", o->tessellation,
+       "hardware: by the card's stages; mesh: by compute shaders; published: without the guarantee, for "
+       "comparison. Else mesh where frames follow each other on a CPU device, and hardware")
+      ->transform(CLI::CheckedTransformer(kWays));
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });
 }

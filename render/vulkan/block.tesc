@@ -1,5 +1,5 @@
 #version 450
-// Segments of a block's edges (edges.comp) become tessellation levels.
+// Segments of a block's edges (factor_edges.comp) become tessellation levels.
 #extension GL_GOOGLE_include_directive : require
 #include "terrain.glsl"
 

@@ -24,6 +24,7 @@ struct Extraction {
   std::vector<PatchId> patches;  ///< by bottom, then by the order of the model (the greater first)
   Cost cost;
   double bound_max = 0;  ///< metres: the largest that they give (k = 0), half cells beyond samples included
+  double bound_inside = 0;     ///< the same without these
   double error_available = 0;  ///< metres: the smallest bottom among them
 };
 

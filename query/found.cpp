@@ -49,6 +49,7 @@ Extraction in_order(std::vector<FoundPatch>& found) {
     result.bound_max = std::max(result.bound_max, bound_of(f));
   }
   result.error_available = found.empty() ? 0 : found.front().bottom;
+  result.bound_inside = found.empty() ? 0 : found.back().bottom;
   result.cost.patches = found.size(), result.cost.bytes = found.size() * sizeof(PatchSurface::codes);
   return result;
 }

@@ -124,15 +124,16 @@ TEST_F(Extract, StrictLeavesOutWhatIsWorseAndNothingElse) {
 TEST_F(Extract, SaysWhatItCostAndWhichBoundsItGives) {
   for (const double error : kErrors) {
     const Extraction x = extract(*db_, {.error = error});
-    double most = 0, least = INFINITY;
+    double most = 0, inside = 0, least = INFINITY;
     for (const PatchId id : x.patches) {
       const GridInfo& g = grid(id).info;
       const LatticeRect d = g.shape.domain(id.level(), id.bx(), id.by());
       const bool rim = d.i0 < 0 || d.j0 < 0 || d.i1 > g.shape.width() - 1 || d.j1 > g.shape.height() - 1;
       most = std::max(most, db_->patch(id).bottom + (rim ? g.rim_error : 0)),
-      least = std::min(least, db_->patch(id).bottom);
+      inside = std::max(inside, db_->patch(id).bottom), least = std::min(least, db_->patch(id).bottom);
     }
     EXPECT_EQ(x.bound_max, most);
+    EXPECT_EQ(x.bound_inside, inside);
     EXPECT_EQ(x.error_available, least);
     EXPECT_EQ(x.cost.patches, x.patches.size());
     EXPECT_EQ(x.cost.bytes, x.patches.size() * sizeof(PatchSurface::codes));
@@ -142,6 +143,7 @@ TEST_F(Extract, SaysWhatItCostAndWhichBoundsItGives) {
   const Extraction far = extract(*db_, {.error = 1, .region = Region::inside(Extent{1e6, 1e6, 2e6, 2e6})});
   EXPECT_TRUE(far.patches.empty());
   EXPECT_EQ(far.bound_max, 0);
+  EXPECT_EQ(far.bound_inside, 0);
 }
 
 TEST_F(Extract, CoarserCutsNeedFewerPatches) {

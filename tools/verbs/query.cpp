@@ -155,8 +155,11 @@ Json json_of(const Database& db, PatchId id) {
 
 void print_text(const Database& db, const Asked& asked, const Options& o) {
   const Extraction& x = asked.extraction;
-  fmt::print("{} patches at error {:g} {}: bounds {:.4g} to {:.4g} m\n", x.patches.size(), asked.error,
-             asked.unit, x.error_available, x.bound_max);
+  fmt::print("{} patches at error {:g} {}: bounds {:.4g} to {:.4g} m", x.patches.size(), asked.error,
+             asked.unit, x.error_available, x.bound_inside);
+  if (x.bound_max > x.bound_inside)
+    fmt::print(", and up to {:.4g} m in half cells beyond a grid's outer samples", x.bound_max);
+  fmt::print("\n");
   fmt::print("  by level {}\n  by grid {}\n", by_level(x).dump(), by_grid(db, x).dump());
   fmt::print("  cost: {} pages and {} boxes of the R-tree, {:.2f} MB of samples, {:.3f} ms\n", x.cost.nodes,
              x.cost.boxes, double(x.cost.bytes) / 1e6, 1000 * x.cost.seconds);
@@ -184,6 +187,7 @@ void run(const Options& o, const Common& common) {
          {"by_level", by_level(x)},
          {"by_grid", by_grid(db, x)},
          {"bound_max", x.bound_max},
+         {"bound_inside", x.bound_inside},
          {"error_available", x.error_available}};
   j["cost"] = json_of(x.cost);
   if (o.list)

@@ -133,7 +133,7 @@ TEST_F(Verbs, InfoHasTheKeysThatProgramsRelyOn) {
 TEST_F(Verbs, QueryHasTheKeysThatProgramsRelyOn) {
   const std::string db = hill_database();
   const Json q = json({"query", db, "--error", "0.5", "--list", "--json"});
-  EXPECT_EQ(missing_keys(q, {"patches", "by_level", "by_grid", "bound_max", "error_available", "cost"}),
+  EXPECT_EQ(missing_keys(q, {"patches", "by_level", "by_grid", "bound_max", "bound_inside", "error_available", "cost"}),
             Words{});
   EXPECT_EQ(missing_keys(q["cost"], {"nodes", "boxes", "patches", "bytes", "seconds"}), Words{});
   const auto n = q["patches"].get<std::size_t>();
@@ -148,6 +148,21 @@ TEST_F(Verbs, QueryHasTheKeysThatProgramsRelyOn) {
                   "--json"})["by_grid"]
                 .size(),
             1u);
+}
+
+TEST_F(Verbs, RenderTessellatesAsItIsTold) {
+  const std::string db = hill_database();
+  const auto draw = [&](const std::string& way) {
+    const std::string out = in_directory("way" + way + ".png");
+    Words words{"render", db, out, "--size", "160", "90", "--json"};
+    if (!way.empty()) words.insert(words.end(), {"--tessellation", way});
+    const Outcome o = run(words);
+    EXPECT_EQ(o.code, 0) << o.err;
+    return Json::parse(o.out)["tessellation"].get<std::string>();
+  };
+  for (const char* way : {"hardware", "mesh", "published"}) EXPECT_EQ(draw(way), way);
+  EXPECT_EQ(draw(""), "hardware") << "a single picture, whatever the device";
+  EXPECT_EQ(run({"render", db, in_directory("x.png"), "--tessellation", "skirts"}).code, 2);
 }
 
 TEST_F(Verbs, QuietSaysNothing) {

@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 #include <gdal_priv.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <thread>
 
 #include "db/error.h"
@@ -16,11 +16,14 @@ namespace patchwork::cli {
 
 namespace {
 
+const std::map<std::string, Tessellation> kWays{{"hardware", Tessellation::hardware},
+                                                {"mesh", Tessellation::mesh},
+                                                {"published", Tessellation::published}};
+
 struct Options {
-  std::string database, out, scene, depth;
+  std::string database, out, scene, depth, tessellation;
   std::vector<int> size;
   double pixel_error = 0, follow = 0;
-  std::optional<Tessellation> tessellation;
   bool stats = false;
 };
 
@@ -113,7 +116,7 @@ Json summary(const Total& t, const Scene& scene, const std::string& device, doub
 
 RendererOptions options_of(const Scene& scene, const Options& o, const Common& common) {
   RendererOptions r = renderer_options(scene, common.memory);
-  r.tessellation = o.tessellation;
+  if (!o.tessellation.empty()) r.tessellation = kWays.at(o.tessellation);
   // A mesh takes more to make of each tile, and wins where tiles are drawn again.
   if (!r.tessellation && !scene.path && o.follow == 0) r.tessellation = Tessellation::hardware;
   return r;
@@ -149,6 +152,10 @@ class Film {
   }
 
   const std::string& device() const { return device_->name(); }
+  const std::string& tessellation() const {
+    const auto used = [&](const auto& way) { return way.second == renderer_.tessellation(); };
+    return std::find_if(kWays.begin(), kWays.end(), used)->first;
+  }
   Total total;
   Json per_frame = Json::array();
 
@@ -178,6 +185,7 @@ void run(const Options& o, const Common& common) {
   if (o.follow > 0) film.follow(views.back(), db, o.follow);
   const Total& t = film.total;
   Json document = summary(t, scene, film.device(), seconds_since(start));
+  document["tessellation"] = film.tessellation();
   if (o.stats) document["per_frame"] = film.per_frame;
   if (common.json || o.stats) return print(document);
   if (common.quiet) return;
@@ -206,14 +214,11 @@ void add_render(CLI::App& app, Common& common) {
                 "seconds: another picture, OUT_0001.png, ..., for each change of the database")
       ->check(above_zero());
   v->add_flag("--stats", o->stats, "what each frame cost and reached, as JSON");
-  static const std::map<std::string, Tessellation> kWays{{"hardware", Tessellation::hardware},
-                                                         {"mesh", Tessellation::mesh},
-                                                         {"published", Tessellation::published}};
   v->add_option(
        "--tessellation", o->tessellation,
        "hardware: by the card's stages; mesh: by compute shaders; published: without the guarantee, for "
        "comparison. Else mesh where frames follow each other on a CPU device, and hardware")
-      ->transform(CLI::CheckedTransformer(kWays));
+      ->check(CLI::IsMember(kWays));
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });
 }

@@ -73,8 +73,9 @@ class Sampler {
   /// How many points there were, and how many patches were read for one.
   std::string summary() const {
     const double mean = counts_.points ? double(counts_.contributions) / double(counts_.points) : 0;
-    return fmt::format("{} points from {} patches on {}; {:.3f} patches read a point, {} at most",
-                       counts_.points, patches_.size(), engine_name(*blend_), mean, counts_.most);
+    return fmt::format("{} point{} from {} patches on {}; {:.3f} patches read a point, {} at most",
+                       counts_.points, counts_.points == 1 ? "" : "s", patches_.size(), engine_name(*blend_),
+                       mean, counts_.most);
   }
 
  private:

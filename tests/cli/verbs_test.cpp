@@ -133,7 +133,8 @@ TEST_F(Verbs, InfoHasTheKeysThatProgramsRelyOn) {
 TEST_F(Verbs, QueryHasTheKeysThatProgramsRelyOn) {
   const std::string db = hill_database();
   const Json q = json({"query", db, "--error", "0.5", "--list", "--json"});
-  EXPECT_EQ(missing_keys(q, {"patches", "by_level", "by_grid", "bound_max", "bound_inside", "error_available", "cost"}),
+  EXPECT_EQ(missing_keys(q, {"patches", "by_level", "by_grid", "bound_max", "bound_inside", "error_available",
+                             "cost"}),
             Words{});
   EXPECT_EQ(missing_keys(q["cost"], {"nodes", "boxes", "patches", "bytes", "seconds"}), Words{});
   const auto n = q["patches"].get<std::size_t>();

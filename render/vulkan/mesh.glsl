@@ -12,7 +12,6 @@ struct Mesh {
   bool seen;
   bool falls;       // alone, its two triangles share the side from (0, 8) to (8, 0); else from (0, 0) to (8, 8)
 };
-const int kBlock = 7, kCodeShift = 19;  // texels of a block's facts, and the bits that their codes leave out: mesh_finish.comp
 const uint kUnseen = 0x80000000u, kFalls = 0x40000000u, kInsideHigh = 0x1ffffu, kEdges = 0xfefefefeu;
 
 uvec4 packed(Mesh m) {

@@ -3,8 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 const bool kTwisting = true;
 #include "tile_finish.glsl"
-
-const int kBlock = 7, kCodeShift = 19;  // mesh.glsl
+#include "mesh_codes.glsl"
 
 // Errors of the triangles of a block (mesh.glsl): of those that vertex (x, y) halves, at place 9 y + x.
 float worst[81];

@@ -3,11 +3,12 @@
 // the depth of the block's nearest point does not allow (mesh_finish.comp).
 #extension GL_GOOGLE_include_directive : require
 #include "mesh.glsl"
+#include "mesh_codes.glsl"
 #include "blocks.glsl"
 
 layout(local_size_x = 64) in;  // the blocks of a tile
 
-layout(binding = 3) uniform usamplerBuffer blocks;  // mesh_finish.comp: kBlock texels a block
+layout(binding = 3) uniform usamplerBuffer blocks;  // mesh_codes.glsl
 layout(binding = 4) writeonly buffer Needs { uvec4 needs[]; };
 
 // Vertices whose code exceeds what is allowed; below 0 all of them.

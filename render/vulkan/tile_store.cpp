@@ -15,7 +15,7 @@ constexpr VkBufferUsageFlags kUsage =
 constexpr std::size_t kHalfCells = 4 * TileLattice::kSamples * TileLattice::kSamples;  // pairs of half floats
 constexpr std::size_t kIndexBytes = kMostTriangles * 12;
 
-// Two texels of tile_finish.comp, seven of mesh_finish.comp.
+// Two texels of tile_finish.comp; or kBlock of mesh_codes.glsl.
 std::size_t block_bytes(const TileStore::Holds& holds) { return holds.meshes ? 7 * 16 : 2 * 16; }
 
 Texture half_cells(const Device::Impl& device, std::uint32_t slots) {

@@ -67,8 +67,10 @@ RendererOptions resolved(RendererOptions o, const Device::Impl& device) {
   return o;
 }
 
+bool knowing(const SceneEffects& e) { return e.error || e.source; }
+
 vk::TileStore::Holds holds(const RendererOptions& o) {
-  return {.knowledge = o.effects.error || o.effects.source, .meshes = o.tessellation == Tessellation::mesh};
+  return {.knowledge = knowing(o.effects), .meshes = o.tessellation == Tessellation::mesh};
 }
 
 }  // namespace
@@ -238,7 +240,7 @@ Image Renderer::picture() const {
 void Renderer::draw_legend(Image& picture) const { impl_->effects.draw_legend(picture); }
 
 void Renderer::change(const SceneEffects& to) {
-  if ((to.error || to.source) && !impl_->store.holds.knowledge)
+  if (knowing(to) && !impl_->store.holds.knowledge)
     throw Error("effects", "this renderer was made without overlays of bounds and sources");
   impl_->options.effects = to;
   impl_->effects.change(scene_of(impl_->options));
@@ -279,14 +281,8 @@ bool Renderer::refresh(Database& db) {
 
 Renderer::Drawn Renderer::drawn() const { return {impl_->store, impl_->block, impl_->draws}; }
 Tessellation Renderer::tessellation() const { return *impl_->options.tessellation; }
-
-std::vector<Renderer::MeshVertex> Renderer::mesh() const {
-  std::vector<MeshVertex> mesh;
-  for (const std::uint32_t n :
-       impl_->terrain.subdivision().read_names(impl_->commands))  // mesh.glsl: name_of
-    mesh.push_back({n >> 16, std::int32_t((n >> 8 & 7) << 5 | (n & 15) << 1 | (n >> 14 & 1)),
-                    std::int32_t((n >> 11 & 7) << 5 | (n >> 4 & 15) << 1 | (n >> 15 & 1))});
-  return mesh;
+std::vector<MeshVertex> Renderer::mesh() const {
+  return impl_->terrain.subdivision().read_mesh(impl_->commands);
 }
 
 void Renderer::reshape(int width, int height, double pixel_error) {

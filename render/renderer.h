@@ -18,6 +18,7 @@
 namespace patchwork {
 
 struct TileDraw;
+struct MeshVertex;
 namespace vk {
 struct FrameBlock;
 class Target;
@@ -104,13 +105,8 @@ class Renderer {
   };
   Drawn drawn() const;
   Tessellation tessellation() const;
-  /// A vertex of a mesh: which of drawn().draws, and its half cells there.
-  struct MeshVertex {
-    std::uint32_t draw;
-    std::int32_t x, y;
-  };
-  /// Three for each triangle of the last frame, seen or clipped, counterclockwise from above; none but with
-  /// Tessellation::mesh.
+  /// Three vertices (tile_seams.h) for each triangle of the last frame, seen or clipped, counterclockwise
+  /// from above; none but with Tessellation::mesh.
   std::vector<MeshVertex> mesh() const;
   /// From the next frame on: another size of the picture (pixels, at least 1 x 1), another error. Tiles stay.
   void reshape(int width, int height, double pixel_error);

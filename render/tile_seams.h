@@ -41,6 +41,12 @@ struct TileDraw {
 };
 static_assert(sizeof(TileDraw) == 10 * 16);
 
+/// A vertex of a mesh of drawn tiles: which draw, and its half cells there.
+struct MeshVertex {
+  std::uint32_t draw;
+  std::int32_t x, y;
+};
+
 /// A draw for each drawn leaf: those without holes, then those with some, nearest to the eye first. `draws`
 /// is overwritten.
 void make_draws(const TileLattice& lattice, const Selection& selection, const TileCache& cache, Point eye,

@@ -28,6 +28,12 @@ constexpr VkBufferUsageFlags kWordTexels =
 constexpr std::size_t kBlockTexel = TileStore::kBlocks * 16;  // bytes of a tile: one texel a block
 using Call = VkDrawIndexedIndirectCommand;
 
+// mesh.glsl: draw_named, half_cells_named.
+MeshVertex named(std::uint32_t n) {
+  return {n >> 16, std::int32_t((n >> 8 & 7) << 5 | (n & 15) << 1 | (n >> 14 & 1)),
+          std::int32_t((n >> 11 & 7) << 5 | (n >> 4 & 15) << 1 | (n >> 15 & 1))};
+}
+
 class Mesh : public Subdivision {
  public:
   explicit Mesh(const Subdivided& what)
@@ -82,20 +88,21 @@ class Mesh : public Subdivision {
   }
   std::uint32_t draws() const override { return (solid_ > 0) + (holed_ > 0); }
 
-  std::vector<std::uint32_t> read_names(Commands& commands) const override {
-    std::vector<std::uint32_t> names;
-    if (tiles() == 0) return names;
+  std::vector<MeshVertex> read_mesh(Commands& commands) const override {
+    std::vector<MeshVertex> mesh;
+    if (tiles() == 0) return mesh;
     const Buffer to(bindings_.device(), indices_.bytes(), VK_BUFFER_USAGE_TRANSFER_DST_BIT, Where::readback);
     const VkCommandBuffer c = commands.begin();
     const VkBufferCopy all{0, 0, indices_.bytes()};
     vkCmdCopyBuffer(c, indices_.get(), to.get(), 1, &all);
     barrier(c);
     commands.submit(), commands.wait();
-    const auto* from = reinterpret_cast<const std::uint32_t*>(to.mapped());
+    const auto* names = reinterpret_cast<const std::uint32_t*>(to.mapped());
     const auto* calls = reinterpret_cast<const Call*>(calls_.mapped());
     for (int k = 0; k < 2; ++k)
-      names.insert(names.end(), from + calls[k].firstIndex, from + calls[k].firstIndex + calls[k].indexCount);
-    return names;
+      for (std::uint32_t v = 0; v < calls[k].indexCount; ++v)
+        mesh.push_back(named(names[calls[k].firstIndex + v]));
+    return mesh;
   }
 
  private:

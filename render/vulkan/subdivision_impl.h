@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "render/tile_seams.h"
 #include "render/vulkan/graphics_impl.h"
 #include "render/vulkan/tile_store_impl.h"
 
@@ -41,9 +42,8 @@ class Subdivision {
   virtual void draw(VkCommandBuffer commands, bool holes) const = 0;
   virtual std::uint32_t draws() const = 0;  ///< of both calls
 
-  /// The names of the vertices of all triangles that were recorded last (mesh.glsl), if it makes a mesh.
-  /// Waits for the card.
-  virtual std::vector<std::uint32_t> read_names(Commands&) const { return {}; }
+  /// Three vertices for each triangle that was recorded last, if it makes a mesh. Waits for the card.
+  virtual std::vector<MeshVertex> read_mesh(Commands&) const { return {}; }
 };
 
 std::unique_ptr<Subdivision> make_tessellation(const Subdivided& what);

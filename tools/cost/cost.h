@@ -17,7 +17,7 @@ struct CostOptions {
   std::vector<double> extent;  ///< xmin ymin xmax ymax; empty: all, or as much as kMostPatches allow
   std::string scene;     ///< a file; its camera is that of the views; empty: one over the south-west corner
   int side = 512;        ///< heights along each side of the picture
-  int runs = 6;          ///< measured at least, of which half count; one more comes before to warm up
+  int runs = 6;          ///< measured at least: rounds.h says which count
   double seconds = 270;  ///< that all may take before it stays at `runs`
   int points = 1 << 17;  ///< at which errors are measured
 };

@@ -10,6 +10,7 @@
 #include "render/renderer.h"
 #include "render/scene.h"
 #include "tools/cost/check_points.h"
+#include "tools/scene_setup.h"
 
 namespace patchwork::cli {
 
@@ -32,10 +33,7 @@ struct FrameKnob {
 std::vector<FrameKnob> all_knobs() {
   std::vector<FrameKnob> all;
   for (const double pixels : kFrameErrors) all.push_back({"frame", fmt::format("{:g}", pixels), pixels});
-  for (const auto& [name, way] : {std::pair{"hardware", Tessellation::hardware},
-                                  {"mesh", Tessellation::mesh},
-                                  {"published", Tessellation::published}})
-    all.push_back({"tessellation", name, kTessellated, way});
+  for (const auto& [name, way] : kTessellations) all.push_back({"tessellation", name, kTessellated, way});
   all.push_back({"sky_directions", "no sky light", kTessellated});
   for (const int n : kDirections) {
     all.push_back({"sky_directions", std::to_string(n), kTessellated});

@@ -55,9 +55,8 @@ constexpr Section kSections[] = {
      "errors and factors, draw. The error is that on the screen, of every pixel, measured through its depth. "
      "The uniform grid is only read."},
     {"tessellation", "Tessellation",
-     "By the card's stages or as a mesh that shaders make, the error that is asked for is kept to; the "
-     "stages as "
-     "they were published do not promise it."},
+     "The card's stages and the mesh that shaders make keep to the error that is asked for; the stages as "
+     "published do not promise it."},
     {"sky_directions", "Sky light",
      "Directions in which each place looks for the sky, in a map over the terrain that later frames keep. "
      "Rest: what no other stage of the frame takes."},

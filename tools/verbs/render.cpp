@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <thread>
 
 #include "db/error.h"
@@ -15,10 +14,6 @@
 namespace patchwork::cli {
 
 namespace {
-
-const std::map<std::string, Tessellation> kWays{{"hardware", Tessellation::hardware},
-                                                {"mesh", Tessellation::mesh},
-                                                {"published", Tessellation::published}};
 
 struct Options {
   std::string database, out, scene, depth, tessellation;
@@ -116,7 +111,7 @@ Json summary(const Total& t, const Scene& scene, const std::string& device, doub
 
 RendererOptions options_of(const Scene& scene, const Options& o, const Common& common) {
   RendererOptions r = renderer_options(scene, common.memory);
-  if (!o.tessellation.empty()) r.tessellation = kWays.at(o.tessellation);
+  if (!o.tessellation.empty()) r.tessellation = kTessellations.at(o.tessellation);
   // A mesh takes more to make of each tile, and wins where tiles are drawn again.
   if (!r.tessellation && !scene.path && o.follow == 0) r.tessellation = Tessellation::hardware;
   return r;
@@ -154,7 +149,7 @@ class Film {
   const std::string& device() const { return device_->name(); }
   const std::string& tessellation() const {
     const auto used = [&](const auto& way) { return way.second == renderer_.tessellation(); };
-    return std::find_if(kWays.begin(), kWays.end(), used)->first;
+    return std::find_if(kTessellations.begin(), kTessellations.end(), used)->first;
   }
   Total total;
   Json per_frame = Json::array();
@@ -218,7 +213,7 @@ void add_render(CLI::App& app, Common& common) {
        "--tessellation", o->tessellation,
        "hardware: by the card's stages; mesh: by compute shaders; published: without the guarantee, for "
        "comparison. Else mesh where frames follow each other on a CPU device, and hardware")
-      ->check(CLI::IsMember(kWays));
+      ->check(CLI::IsMember(kTessellations));
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });
 }

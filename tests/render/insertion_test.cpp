@@ -1,0 +1,204 @@
+// Surveys that come and go while the terrain is drawn: what is made anew, and that the error is kept.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "tests/hard_case.h"
+#include "tests/render/terrain_views.h"
+
+namespace patchwork {
+namespace {
+
+// Depth pictures as bits: NaN equals itself.
+std::vector<std::uint32_t> bits(const std::vector<float>& v) {
+  std::vector<std::uint32_t> b(v.size());
+  std::memcpy(b.data(), v.data(), 4 * v.size());
+  return b;
+}
+
+class InsertionTest : public VulkanTest {
+ protected:
+  void SetUp() override {
+    VulkanTest::SetUp();
+    Database writer = folder_.database();
+    folder_.add(writer, surveys()[0], "base");
+  }
+  Database reader() const { return Database::open(folder_.path("grids.patchwork")); }
+  void insert(std::size_t k) {
+    Database writer = folder_.database();
+    folder_.add(writer, surveys()[k], "survey" + std::to_string(k));
+  }
+  void remove(std::size_t k) {
+    Database writer = folder_.database();
+    writer.remove("survey" + std::to_string(k));
+  }
+  GridFolder folder_;
+};
+
+TEST_F(InsertionTest, MakesTheTilesAnewThatItTouchesAndNoOther) {
+  Database db = reader();
+  const RendererOptions options{.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20};
+  Renderer r(test_device(), db, options);
+  const Camera camera{{800, -200, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+  const FrameStats first = r.draw(camera);
+  EXPECT_FALSE(r.refresh(db));
+  insert(2);
+  EXPECT_TRUE(r.refresh(db));
+  const FrameStats second = r.draw(camera);
+  EXPECT_GT(second.tiles_made, 0u);
+  EXPECT_LT(second.tiles_made, first.tiles_made) << "those that the survey does not touch stay";
+  EXPECT_EQ(r.cache().find_violation(), "");
+  // A renderer that begins here has another lattice; one that keeps it agrees with the blend.
+  const Extraction x = extract(db, {.error = 0});
+  const Blend best(db, x.patches, {.smoothness = 1});
+  EXPECT_LE(screen_error(best, camera, r.depth()).worst, 1.01);
+}
+
+TEST_F(InsertionTest, OnceItIsTakenBackThePictureIsWhatItWasAndNoPatchIsSentAgain) {
+  Database db = reader();
+  Renderer r(test_device(), db, {.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20});
+  const Camera camera{{800, -200, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+  r.draw(camera);
+  const auto before = bits(r.depth());
+  insert(2);
+  EXPECT_TRUE(r.refresh(db));
+  const FrameStats with = r.draw(camera);
+  EXPECT_GT(with.patches_sent, 0u);
+  EXPECT_NE(bits(r.depth()), before);
+  remove(2);
+  EXPECT_TRUE(r.refresh(db));
+  const FrameStats without = r.draw(camera);
+  EXPECT_GT(without.tiles_made, 0u);
+  EXPECT_EQ(without.patches_sent, 0u) << "all that it is made from stayed on the card";
+  EXPECT_EQ(bits(r.depth()), before);
+}
+
+// Where a tile held nothing, a survey may come.
+TEST_F(InsertionTest, OneBesideAllDataIsSeen) {
+  Database db = reader();
+  Renderer r(test_device(), db, {.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20});
+  const Extent e = db.extent();
+  const Camera camera{{e.xmax + 200, 800, 900}, {e.xmax + 201, 800, 300}, 40, kWidth, kHeight};
+  r.draw(camera);
+  const auto covered = [&] {
+    std::size_t n = 0;
+    for (const float d : r.depth()) n += !std::isnan(d);
+    return n;
+  };
+  const std::size_t before = covered();
+  {
+    Database writer = folder_.database();
+    GridFile file = surveys()[0];
+    file.geotransform[0] = e.xmax + 100;
+    folder_.add(writer, file, "beside");
+  }
+  EXPECT_TRUE(r.refresh(db));
+  r.draw(camera);
+  EXPECT_GT(covered(), before + 1000);
+}
+
+TEST_F(InsertionTest, AskingForWhatIsNewHoldsNoWorkerUnlessThereIsSome) {
+  Database db = reader();
+  RendererOptions options{.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20};
+  options.realtime = true, options.make_ms = 1;
+  Renderer r(test_device(), db, options);
+  const Camera camera{{800, -200, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+  FrameStats last = r.draw(camera);
+  for (int n = 0; n < 5000 && last.tiles_wanted > 0; ++n) {
+    EXPECT_FALSE(r.refresh(db));
+    last = r.draw(camera);
+    ASSERT_FALSE(last.workers_held) << "nothing is new";
+  }
+  EXPECT_EQ(last.tiles_wanted, 0u);
+  insert(2);
+  bool moved = false;
+  for (int n = 0; n < 5000 && !moved; ++n) moved = r.refresh(db), last = r.draw(camera);
+  EXPECT_TRUE(moved);
+  EXPECT_FALSE(last.workers_held);
+  EXPECT_GT(last.tiles_stale, 0u) << "old tiles are drawn until they are made anew";
+  for (int n = 0; n < 5000 && last.tiles_wanted > 0; ++n) last = r.draw(camera);
+  EXPECT_EQ(last.tiles_stale, 0u);
+}
+
+TEST_F(InsertionTest, OneFarAwayChangesNoPixel) {
+  Database db = reader();
+  Renderer r(test_device(), db, {.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20});
+  const Camera camera{{200, 300, 420}, {200, 200, 380}, 30, kWidth, kHeight};  // survey 2 begins at x = 700
+  r.draw(camera);
+  const auto before = bits(r.depth());
+  insert(2);
+  EXPECT_TRUE(r.refresh(db));
+  Camera step = camera;
+  step.eye.x += 1;
+  r.draw(step);
+  r.draw(camera);
+  EXPECT_EQ(bits(r.depth()), before);
+}
+
+// Two hundred views, with a survey more after each dozen: old and new tiles side by side keep to what was
+// asked.
+TEST_F(InsertionTest, TessellationErrorWhileSurveysComeIn) {
+  for (const auto& [name, way] : kWays) {
+    std::mt19937_64 random(test_seed(24));
+    double worst = 0;  // in the pixels asked for
+    for (const double tau : {0.5, 1.0, 2.0, 4.0}) {
+      GridFolder folder;
+      {
+        Database writer = folder.database();
+        folder.add(writer, surveys()[0], "base");
+      }
+      Database db = Database::open(folder.path("grids.patchwork"));
+      Renderer r(test_device(), db,
+                 {.width = kWidth,
+                  .height = kHeight,
+                  .pixel_error = tau,
+                  .memory = std::size_t{128} << 20,
+                  .tessellation = way});
+      Extraction x = extract(db, {.error = 0});
+      auto best = std::make_unique<Blend>(db, x.patches, BlendOptions{.smoothness = 1});
+      for (int n = 0; n < 50; ++n) {
+        if (n % 12 == 11 && n / 12 < 3) {
+          Database writer = folder.database();
+          folder.add(writer, surveys()[std::size_t(n / 12 + 1)], "survey" + std::to_string(n));
+          best.reset();
+          ASSERT_TRUE(r.refresh(db));
+          x = extract(db, {.error = 0});
+          best = std::make_unique<Blend>(db, x.patches, BlendOptions{.smoothness = 1});
+        }
+        const Camera camera = random_camera(db, random);
+        const FrameStats stats = r.draw(camera);
+        EXPECT_LE(stats.pixels_reached, tau);
+        const double error = screen_error(*best, camera, r.depth()).worst;
+        EXPECT_LE(error, tau * 1.001 + 0.01) << name << ", tau " << tau << " view " << n;
+        worst = std::max(worst, error / tau);
+      }
+      EXPECT_EQ(r.cache().find_violation(), "");
+    }
+    report_case("TessellationError", fmt::format("{}, views while three surveys come in", name), 200, worst,
+                1.021, "of the pixels asked");
+  }
+}
+
+TEST_F(InsertionTest, InRealTimeAFlightReachesTheSamePicture) {
+  insert(1);
+  Database db = reader();
+  RendererOptions options{.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20};
+  Renderer waits(test_device(), db, options);
+  options.realtime = true, options.make_ms = 5;
+  Renderer flies(test_device(), db, options);
+  const Camera camera{{800, -200, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+  waits.draw(camera);
+  const FrameStats first = flies.draw(camera);
+  EXPECT_GT(first.tiles_drawn, 0u) << "something is drawn at once";
+  EXPECT_GT(first.tiles_wanted, 0u);
+  EXPECT_GT(first.pixels_reached, 1) << "and it says how good it is";
+  FrameStats last = first;
+  for (int n = 0; n < 5000 && last.tiles_wanted > 0; ++n) last = flies.draw(camera);
+  EXPECT_EQ(last.tiles_wanted, 0u);
+  EXPECT_LE(last.pixels_reached, 1);
+  EXPECT_EQ(bits(flies.depth()), bits(waits.depth()));
+}
+
+}  // namespace
+}  // namespace patchwork

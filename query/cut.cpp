@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "db/error.h"
@@ -57,14 +58,20 @@ std::vector<Point> convex_hull(std::vector<Point> points) {
   return hull;
 }
 
-// A side of a convex region: inside are the points with nx x + ny y <= most. What is positive of a normal
-// stands apart from what is negative, so that a box's innermost and outermost corner need no choice.
-struct Side {
-  double nx_up, nx_down, ny_up, ny_down;
-  double most, nearly;  // nearly: with a hair of slack
+// The sides of a convex region, eight to a vector: inside are the points with nx x + ny y <= most. What is
+// positive of a normal stands apart from what is negative, so that a box's innermost and outermost corner
+// need no choice. Those that are there to fill a vector hold every point.
+struct EightSides {
+  static constexpr std::size_t kSides = 8;
 
-  Side(double nx, double ny, double limit);
-  bool beyond(Point p) const { return (nx_up + nx_down) * p.x + (ny_up + ny_down) * p.y > most; }
+  double nx_up[kSides] = {}, nx_down[kSides] = {}, ny_up[kSides] = {}, ny_down[kSides] = {};
+  double most[kSides], nearly[kSides];  // nearly: with a hair of slack
+
+  EightSides() { std::fill_n(most, kSides, INFINITY), std::fill_n(nearly, kSides, INFINITY); }
+  void set(std::size_t i, double nx, double ny, double limit);
+  bool beyond(std::size_t i, Point p) const {
+    return (nx_up[i] + nx_down[i]) * p.x + (ny_up[i] + ny_down[i]) * p.y > most[i];
+  }
 };
 
 // A hair of slack makes up for the rounding of squares, which stand for roots.
@@ -95,38 +102,34 @@ PATCHWORK_VECTORIZED void near_enough(const LodPage& page, Point eye, double hei
   for (std::uint32_t s = 0; s < LodPage::kSlots; ++s) hit[s] = std::uint8_t(least[s] >= 0);
 }
 
-Side::Side(double nx, double ny, double limit)
-    : nx_up(greater(nx, 0)),
-      nx_down(lesser(nx, 0)),
-      ny_up(greater(ny, 0)),
-      ny_down(lesser(ny, 0)),
-      most(limit),
-      nearly(limit + kHair * std::abs(limit)) {}
+void EightSides::set(std::size_t i, double nx, double ny, double limit) {
+  nx_up[i] = greater(nx, 0), nx_down[i] = lesser(nx, 0);
+  ny_up[i] = greater(ny, 0), ny_down[i] = lesser(ny, 0);
+  most[i] = limit, nearly[i] = limit + kHair * std::abs(limit);
+}
 
 // Of the boxes that a page met those that have a corner on the inner side of each side; `inside` are those
-// that have all corners there. Few are left to be asked: they are gathered, eight to a vector.
-PATCHWORK_VECTORIZED void keep_inside(const LodPage& page, const std::vector<Side>& sides, LodHits& hits) {
-  constexpr std::uint32_t kEight = 8;
-  using Eight = double __attribute__((vector_size(kEight * sizeof(double))));
+// that have all corners there. Few are left to be asked, so a vector takes the sides of one box.
+PATCHWORK_VECTORIZED void keep_inside(const LodPage& page, const std::vector<EightSides>& sides,
+                                      LodHits& hits) {
+  using Numbers = double __attribute__((vector_size(EightSides::kSides * sizeof(double))));
+  using Bytes = std::int8_t __attribute__((vector_size(EightSides::kSides)));
   std::uint64_t out = 0, not_whole = 0;
-  for (std::uint64_t left = hits.met; left;) {
-    Eight x0 = {}, y0 = {}, x1 = {}, y1 = {};
-    std::uint32_t slot[kEight], n = 0;
-    for (; left && n < kEight; left &= left - 1, ++n) {
-      const auto s = slot[n] = std::uint32_t(std::countr_zero(left));
-      x0[n] = page.xmin[s], y0[n] = page.ymin[s], x1[n] = page.xmax[s], y1[n] = page.ymax[s];
-    }
-    Eight inner = Eight{} - INFINITY, outer = inner;  // how far a box's corners lie beyond any side
-    for (const Side& side : sides) {
-      const Eight in =
-          (side.nx_up * x0 + side.nx_down * x1) + (side.ny_up * y0 + side.ny_down * y1) - side.nearly;
-      const Eight at =
-          (side.nx_up * x1 + side.nx_down * x0) + (side.ny_up * y1 + side.ny_down * y0) - side.most;
-      inner = in > inner ? in : inner, outer = at > outer ? at : outer;
-    }
-    for (std::uint32_t i = 0; i < n; ++i) {
-      out |= std::uint64_t{inner[i] > 0} << slot[i];
-      not_whole |= std::uint64_t{outer[i] > 0} << slot[i];
+  for (const EightSides& e : sides) {
+    Numbers nx_up, nx_down, ny_up, ny_down, most, nearly;
+    std::memcpy(&nx_up, e.nx_up, sizeof(Numbers)), std::memcpy(&nx_down, e.nx_down, sizeof(Numbers));
+    std::memcpy(&ny_up, e.ny_up, sizeof(Numbers)), std::memcpy(&ny_down, e.ny_down, sizeof(Numbers));
+    std::memcpy(&most, e.most, sizeof(Numbers)), std::memcpy(&nearly, e.nearly, sizeof(Numbers));
+    for (std::uint64_t left = hits.met; left; left &= left - 1) {
+      const auto s = std::uint32_t(std::countr_zero(left));
+      const double x0 = page.xmin[s], y0 = page.ymin[s], x1 = page.xmax[s], y1 = page.ymax[s];
+      const Bytes in =
+          __builtin_convertvector((nx_up * x0 + nx_down * x1) + (ny_up * y0 + ny_down * y1) > nearly, Bytes);
+      out |= std::uint64_t{std::bit_cast<std::uint64_t>(in) != 0} << s;
+      if (page.level == 0) continue;  // there is nothing below it
+      const Bytes at =
+          __builtin_convertvector((nx_up * x1 + nx_down * x0) + (ny_up * y1 + ny_down * y0) > most, Bytes);
+      not_whole |= std::uint64_t{std::bit_cast<std::uint64_t>(at) != 0} << s;
     }
   }
   hits.met &= ~out, hits.inside &= ~(out | not_whole);
@@ -142,7 +145,8 @@ class ViewSurface : public CutSurface {
     for (std::size_t k = 0; corners_.size() >= 3 && k < corners_.size(); ++k) {
       const Point &a = corners_[k], &b = corners_[(k + 1) % corners_.size()];
       const double nx = b.y - a.y, ny = a.x - b.x;  // outward of a counterclockwise polygon
-      sides_.emplace_back(nx, ny, std::max(nx * a.x + ny * a.y, nx * b.x + ny * b.y));
+      if (k % EightSides::kSides == 0) sides_.emplace_back();
+      sides_.back().set(k % EightSides::kSides, nx, ny, std::max(nx * a.x + ny * a.y, nx * b.x + ny * b.y));
       bounds_ = {std::min(bounds_.xmin, a.x), std::min(bounds_.ymin, a.y), std::max(bounds_.xmax, a.x),
                  std::max(bounds_.ymax, a.y)};
     }
@@ -167,8 +171,10 @@ class ViewSurface : public CutSurface {
     const Frame& f = grid.info.frame;
     const Point rect[] = {f.to_domain(d.i0, d.j0), f.to_domain(d.i1, d.j0), f.to_domain(d.i1, d.j1),
                           f.to_domain(d.i0, d.j1)};
-    for (const Side& side : sides_) {
-      const auto beyond = [&](const Point& p) { return side.beyond(p); };
+    for (std::size_t k = 0; k < corners_.size(); ++k) {
+      const auto beyond = [&](const Point& p) {
+        return sides_[k / EightSides::kSides].beyond(k % EightSides::kSides, p);
+      };
       if (std::all_of(std::begin(rect), std::end(rect), beyond)) return false;
     }
     LatticeRect seen{INFINITY, INFINITY, -INFINITY, -INFINITY};
@@ -196,7 +202,7 @@ class ViewSurface : public CutSurface {
   double slope_;  // metres of tolerance a metre of distance
   std::vector<Point> corners_;
   Extent bounds_{INFINITY, INFINITY, -INFINITY, -INFINITY};  // of the corners
-  std::vector<Side> sides_;
+  std::vector<EightSides> sides_;
 };
 
 }  // namespace

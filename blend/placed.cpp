@@ -43,9 +43,10 @@ Blend::Placed place(const Database& db, PatchId id, int smoothness) {
   p.ramp = ramp_of(p.kernel, p.domain, p.samples);
   p.has_rim = p.ramp.i0 > p.domain.i0 || p.ramp.j0 > p.domain.j0 || p.ramp.i1 < p.domain.i1 ||
               p.ramp.j1 < p.domain.j1;
-  p.ragged = g.at(id.level(), id.bx(), id.by()).ragged();
+  const PatchRecord record = db.patch(id);
+  p.ragged = record.ragged();
   p.rim = g.info.rim_error;
-  p.error = g.at(id.level(), id.bx(), id.by()).error[size_t(smoothness)];
+  p.error = record.error[size_t(smoothness)];
   p.volume = 4 / ((domain.i1 - domain.i0) * (domain.j1 - domain.j0) * f.cell_area());
   p.quantum = g.info.quantum, p.base = g.info.base, p.origin = double(g.info.code_origin);
   p.source = std::int32_t(&g - db.grids().data()) + 1;

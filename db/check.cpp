@@ -172,14 +172,15 @@ RepairReport Database::repair(const Progress& progress) {
     for (const Store::Kind kind : kOfGrids)
       for (const std::uint64_t key : Checker::strays(*impl_, kind))
         impl_->store->erase_blobs(kind, key, key + 1), ++report.strays;
+    Restate restate(*impl_);
     try {
-      Restate restate(*impl_);
       report.records = restate.everything();
-      restate.store("repair", extent());
-    } catch (const Error&) {
-      return false;  // records cannot be read: what is left is said below
+    } catch (const Error&) {  // records cannot be read: what is left is said below
+      report = {};
+      return false;
     }
-    return true;
+    restate.store("repair", extent());
+    return report.done = true;
   });
   report.remaining = check(progress);
   return report;

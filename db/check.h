@@ -11,6 +11,7 @@ struct Problem {
 };
 
 struct RepairReport {
+  bool done = false;               ///< false: patch records cannot be read, and nothing was changed
   std::size_t records = 0;         ///< whose top or flag was wrong
   std::size_t strays = 0;          ///< blobs that belonged to no grid
   std::vector<Problem> remaining;  ///< what cannot be derived: heights, and errors measured at import

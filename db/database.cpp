@@ -165,20 +165,23 @@ void Database::Impl::forget_heights(const std::set<GridId>& gone) {
 
 void Database::Impl::change(const std::function<bool()>& work) {
   store->rollback();
-  store->begin_write();
   const auto settle = [&](bool keep) {
     const std::uint64_t mine = version;
     store->begin_read();
     if (!keep || std::stoull(store->fact("version").value_or("0")) != mine) load();
   };
   try {
+    store->begin_write();
     load();  // another process may have written since this one looked
     const bool keep = work();
     keep ? store->commit() : store->rollback();
     settle(keep);
   } catch (...) {
     store->rollback();
-    settle(false);
+    try {
+      settle(false);
+    } catch (const Error&) {  // the first problem is the one to be told
+    }
     throw;
   }
 }
@@ -255,6 +258,20 @@ Database Database::open_or_create(const std::string& path, const std::string& cr
   store.begin_read();
   db.impl_->load();
   return db;
+}
+
+bool Database::made_file() const { return impl_->store->made_file(); }
+
+void Database::remove_if_empty() {
+  Store& store = *impl_->store;
+  store.rollback();
+  try {
+    store.begin_write();
+    if (store.grids().empty()) store.remove_file();
+    store.rollback();
+  } catch (const Error&) {
+    return;  // it is in use
+  }
 }
 
 bool Database::refresh() {

@@ -30,7 +30,7 @@ struct ImportOptions {
   bool dry_run = false;                 ///< all of it, then nothing is kept
   double tolerance = 0;      ///< metres by which a stored sample may differ from the file's; enters the bound
   std::string replace = {};  ///< a grid that goes out in the same transaction; may have the new one's name
-  Progress progress = {};    ///< share done; may be empty
+  Progress progress = {};    ///< share done, 0 once nobody else can write; may be empty
 };
 
 struct ImportReport {
@@ -73,6 +73,11 @@ class Database {
   Database(Database&&) noexcept;
   Database& operator=(Database&&) noexcept;
   ~Database();
+
+  bool made_file() const;  ///< open_or_create() did
+  /// Takes the file away if it holds no grid and nobody is writing to it: who has it open hears of it at the
+  /// next change. After that this object can only be destroyed.
+  void remove_if_empty();
 
   /// Moves to the newest state; false if this is it. Cached heights stay where their grids do.
   bool refresh();

@@ -22,10 +22,10 @@ Frame Frame::from_geotransform(const std::array<double, 6>& gt, const std::strin
   if (!std::all_of(gt.begin(), gt.end(), [](double v) { return std::isfinite(v); }))
     throw Error(where, "its geotransform is not finite", "georeference the file again");
   const double si = std::hypot(gt[1], gt[4]), sj = std::hypot(gt[2], gt[5]);
-  if (!(si > 0) || !(sj > 0) || !std::isfinite(si * sj))
+  if (!(si * sj > 0) || !std::isfinite(si * sj) || !std::isfinite(1 / (si * sj)))
     throw Error(where, "its geotransform has a step of zero", "georeference the file again");
   const double cosine = (gt[1] * gt[2] + gt[4] * gt[5]) / (si * sj);
-  if (std::abs(cosine) > kMaxShear)
+  if (!(std::abs(cosine) <= kMaxShear))
     throw Error(where, "its geotransform is sheared (axes not at right angles)",
                 "warp it first, e.g. with gdalwarp");
   return Frame(

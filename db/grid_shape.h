@@ -22,6 +22,9 @@ inline constexpr int kChunkVertices = 4 * kKernelCells;  ///< side of a stored p
 /// cells.
 class GridShape {
  public:
+  static constexpr int kMostSamples = kKernelCells
+                                      << 21;  ///< along an axis: PatchId counts blocks in 21 bits
+
   GridShape() = default;
   /// REQUIRES: width, height >= 2.
   GridShape(int width, int height, bool pixel_is_area);
@@ -47,6 +50,9 @@ class GridShape {
   LatticeRect kernel(int level, int bx, int by) const;
   LatticeRect domain(int level, int bx, int by) const;
 
+  bool has(int level, int bx, int by) const {
+    return level < levels() && bx < blocks_i(level) && by < blocks_j(level);
+  }
   /// Number of blocks of all levels, and the place of one in a flat array of them: by level, then by tiles of
   /// 16 x 16 blocks (rows of tiles, tiles, rows of blocks, blocks), so that neighbours lie together.
   std::size_t blocks() const { return blocks_; }

@@ -20,7 +20,6 @@ namespace {
 constexpr double kRimFactor =
     0.375;  // (t^2 + t) / 2 at half a cell: what a second difference makes of extrapolation
 constexpr int kTaskRows = kChunkVertices;
-constexpr std::size_t kMaxGrids = 0x7ffe;
 
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -92,6 +91,10 @@ class Importer {
     g.accuracy = source_.accuracy();
     g.quantum = source_.scale() * q.quantum, g.base = source_.offset(), g.code_origin = q.origin;
     g.quantisation = q.error * std::abs(source_.scale());
+    const Extent place = g.frame.bounds(g.shape.footprint());
+    if (!std::isfinite(place.xmax - place.xmin) || !std::isfinite(place.ymax - place.ymin))
+      throw Error(source_.path(), "its geotransform puts it beyond all numbers",
+                  "georeference the file again");
     const double a = source_.scale() * ingest_->lowest() + source_.offset(),
                  b = source_.scale() * ingest_->highest() + source_.offset();
     g.lowest = std::min(a, b), g.highest = std::max(a, b);
@@ -111,7 +114,6 @@ class Importer {
     g.digest = provisional_digest(), g.name = "(import) " + options_.name;
     g.id = db_.store->add_grid(g);
     g.name = options_.name;
-    if (g.id.value > kMaxGrids) throw Error(db_.store->path(), "it holds as many grids as it can");
   }
   Digest provisional_digest() const {
     DigestBuilder d;
@@ -267,6 +269,9 @@ class Importer {
     const double floor = source_.accuracy_in(shape().domain(b.level, b.bx, b.by)) + grid_.info.quantisation;
     for (std::size_t i = 0; i < 3; ++i)
       p.error[i] = std::max(floor + delta[i] * std::abs(grid_.info.quantum), outline);
+    if (!std::all_of(p.error.begin(), p.error.end(), [](double e) { return std::isfinite(e); }))
+      throw Error(source_.path(), "its heights reach too far to be stored",
+                  "is there a value that means no data? give it with --nodata");
     p.bottom = b.level == 0 ? p.error[0] : *std::max_element(p.error.begin(), p.error.end());
   }
 
@@ -324,11 +329,24 @@ class Importer {
 
 }  // namespace
 
+// The first grid brings the CRS.
+void settle_crs(Database::Impl& db, const RasterSource& source) {
+  if (source.crs().empty() || source.crs() == db.crs) return;
+  if (db.crs.empty() && db.grids.empty()) {
+    db.store->set_fact("crs", source.crs());
+    db.crs = source.crs();
+  } else if (!same_crs(db.crs, source.crs())) {
+    throw Error(source.path(), "it was placed in another CRS than the database's", "import it again");
+  }
+}
+
 ImportReport Database::import(const RasterSource& source, const ImportOptions& options) {
   const double start = now();
   ImportReport report;
   double committing = start;
   impl_->change([&] {
+    if (options.progress) options.progress(0);
+    settle_crs(*impl_, source);
     if (!options.replace.empty()) impl_->place(options.replace);
     for (const Grid& g : impl_->grids)
       if (g.info.name == options.name && options.name != options.replace)

@@ -8,6 +8,7 @@ namespace patchwork {
 
 /// The row of a grid in this database file (not part of any content).
 struct GridId {
+  static constexpr std::uint32_t kMost = 0x7ffe;
   std::uint32_t value = 0;
   auto operator<=>(const GridId&) const = default;
 };

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "db/grid_shape.h"
 #include "db/raster_impl.h"
 
 namespace patchwork {
@@ -99,6 +100,9 @@ Facts finish(RawGrid raw, const RasterOptions& options, const std::string& datab
   if (raw.width < 2 || raw.height < 2)
     throw Error(raw.path, "is a grid of " + size_text(raw.width, raw.height) + " samples",
                 "a surface needs at least 2 x 2");
+  if (std::max(raw.width, raw.height) > GridShape::kMostSamples)
+    throw Error(raw.path, "is a grid of " + size_text(raw.width, raw.height) + " samples",
+                "a side has " + std::to_string(GridShape::kMostSamples) + " at most");
   raw.frame();  // a sheared or degenerate file is refused before its heights are read
   const auto target = raster_impl::domain_crs(raw, database_crs);
   Facts f = describe(raw);

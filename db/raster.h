@@ -27,6 +27,9 @@ struct RasterOptions {
   std::optional<double> accuracy = {};   ///< metres; else a stated default and a warning
 };
 
+/// Two descriptions (any form that GDAL understands) of one CRS, but for a vertical part.
+bool same_crs(const std::string& a, const std::string& b);
+
 /// One grid that can be read in rows, any number of times. Not safe for concurrent use.
 class RasterSource {
  public:

@@ -41,7 +41,7 @@ Point centre_lon_lat(const RawGrid& grid) {
   if (!transform || !transform->Transform(1, &p.x, &p.y) || !std::isfinite(p.x) || !(std::abs(p.y) <= 90))
     throw Error(grid.path,
                 messages.explain("its centre has no longitude and latitude in " + crs_label(*grid.crs)),
-                "check its georeference, or give --crs");
+                "check its georeference, e.g. with gdalinfo");
   return p;
 }
 
@@ -125,3 +125,16 @@ std::optional<OGRSpatialReference> domain_crs(RawGrid& grid, const std::string& 
 }
 
 }  // namespace patchwork::raster_impl
+
+namespace patchwork {
+
+bool same_crs(const std::string& a, const std::string& b) {
+  const raster_impl::GdalMessages quiet;
+  OGRSpatialReference p, q;
+  if (p.SetFromUserInput(a.c_str()) != OGRERR_NONE || q.SetFromUserInput(b.c_str()) != OGRERR_NONE)
+    return a == b;
+  raster_impl::make_horizontal(p), raster_impl::make_horizontal(q);
+  return raster_impl::same_crs(p, q);
+}
+
+}  // namespace patchwork

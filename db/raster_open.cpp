@@ -99,16 +99,22 @@ void read_geotransform(GDALDataset& dataset, RawGrid& grid) {
   grid.warnings.push_back("no georeference: pixels taken as metres, y down");
 }
 
+// What GDAL makes of a GeoTIFF that says how its pixels lie, and nothing of where.
+bool is_nameless(const OGRSpatialReference& crs) {
+  const char* const name = crs.GetName();
+  return crs.IsLocal() && (!name || EQUAL(name, "unnamed"));
+}
+
 void read_crs(GDALDataset& dataset, const RasterOptions& options, RawGrid& grid) {
   if (options.crs)
     grid.crs = parse_crs(*options.crs, "--crs");
-  else if (const auto* crs = dataset.GetSpatialRef(); crs && !crs->IsEmpty())
+  else if (const auto* crs = dataset.GetSpatialRef(); crs && !crs->IsEmpty() && !is_nameless(*crs))
     grid.crs = *crs;
   if (!grid.crs) return;
   if (make_horizontal(*grid.crs)) grid.warnings.push_back("the vertical part of its CRS is left out");
   if (!grid.crs->IsProjected() && !grid.crs->IsGeographic() && !grid.crs->IsLocal())
     throw Error(grid.path, "its CRS " + crs_label(*grid.crs) + " has no horizontal plane",
-                "give the right one with --crs");
+                "set the right one, e.g. with gdal_edit.py -a_srs");
 }
 
 double file_unit(GDALDataset& dataset, GDALRasterBand& band, RawGrid& grid) {
@@ -138,6 +144,10 @@ std::optional<double> as_sample(double value, GDALRasterBand& band) {
   if (type == GDT_Float32) {
     constexpr double largest = std::numeric_limits<float>::max();
     return static_cast<float>(std::clamp(value, -largest, largest));
+  }
+  if (type == GDT_Float64) {
+    constexpr double largest = std::numeric_limits<double>::max();
+    return std::clamp(value, -largest, largest);
   }
   int clamped = FALSE, rounded = FALSE;
   const double sample = GDALAdjustValueToDataType(type, value, &clamped, &rounded);

@@ -69,8 +69,10 @@ std::vector<PatchPlace> Restate::places_near(const Extent& extent, std::size_t a
 void Restate::add(Grid grid) {
   const Extent extent = grid.info.frame.bounds(grid.info.shape.footprint());
   const double least = smallest_bottom(grid);
-  db_.grids.push_back(std::move(grid));
-  const std::size_t added = db_.grids.size() - 1;
+  const auto place = std::lower_bound(db_.grids.begin(), db_.grids.end(), grid.info.id,
+                                      [](const Grid& g, GridId id) { return g.info.id < id; });
+  const auto added = std::size_t(place - db_.grids.begin());
+  db_.grids.insert(place, std::move(grid));
   std::vector<PatchPlace> places = places_near(extent, added);
   std::erase_if(places, [&](const PatchPlace& at) {
     const PatchRecord& p = db_.grids[at.grid].patches[at.index];

@@ -1,14 +1,17 @@
 // The SQLite form of the store: one file in WAL mode, one table a kind of thing (schema below).
 #include "db/store.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <thread>
 
 #include "db/codec.h"
 #include "db/error.h"
@@ -21,7 +24,8 @@ namespace {
 
 constexpr int kApplicationId = 0x50776b31;  // "Pwk1", frozen
 constexpr int kSchemaVersion = 2;
-constexpr int kBusyMilliseconds = 10000;
+constexpr int kBusyMilliseconds = 10000, kRetryMilliseconds = 5;
+constexpr std::uintmax_t kPageBytes = 4096;
 constexpr std::size_t kMostPacked = 1 << 24;  // bytes of a records or tree blob, unpacked
 
 constexpr const char* kSchema = R"(
@@ -86,7 +90,8 @@ nlohmann::json facts_of(const GridInfo& g) {
 GridInfo info_from(const nlohmann::json& f) {
   GridInfo g;
   const int width = f.at("width"), height = f.at("height");
-  if (width < 2 || height < 2) throw std::invalid_argument("an impossible size");
+  if (std::min(width, height) < 2 || std::max(width, height) > GridShape::kMostSamples)
+    throw std::invalid_argument("an impossible size");
   g.shape = GridShape(width, height, f.at("area"));
   const auto frame = f.at("frame").get<std::array<double, 6>>();
   for (const double n : frame)
@@ -111,7 +116,14 @@ class SqliteStore : public Store {
     exec("BEGIN");
     pragma("SELECT count(*) FROM fact");  // the snapshot is taken by the first read
   }
-  void begin_write() override { exec("BEGIN IMMEDIATE"); }
+  void begin_write() override {
+    exec("BEGIN IMMEDIATE");
+    int moved = 0;  // a file that is nowhere keeps nothing
+    if (sqlite3_file_control(db_, "main", SQLITE_FCNTL_HAS_MOVED, &moved) == SQLITE_OK && moved) {
+      rollback();
+      throw Error(path_, "it was removed, or another file took its place", "run the command again");
+    }
+  }
   void commit() override { exec("COMMIT"); }
   void rollback() noexcept override {
     for (Statements& s : statements_)
@@ -134,6 +146,10 @@ class SqliteStore : public Store {
   std::vector<Change> changes_after(std::uint64_t version) override;
   std::vector<std::string> find_damage() override;
   std::uint64_t file_bytes() const override;
+  bool made_file() const override { return made_; }
+  void remove_file() override {
+    for (const char* end : {"", "-wal", "-shm"}) std::filesystem::remove(path_ + end);
+  }
 
  private:
   // Of one kind of blobs, made when first needed.
@@ -157,19 +173,46 @@ class SqliteStore : public Store {
   }
   void connect(StoreMode mode, bool frozen);
   void put_grid(const GridInfo& info, const char* sql);
-  void prepare_file(bool may_create) {
-    const std::int64_t application = pragma("PRAGMA application_id"), version = pragma("PRAGMA user_version");
-    const bool blank = application == 0 && version == 0 && pragma("SELECT count(*) FROM sqlite_schema") == 0;
-    if (blank && may_create) {  // pages of 4 KiB: with 8 KiB Puget Sound (1025^2, 16 bit) took 6 % more,
-                                // above its raw samples
-      exec("PRAGMA page_size = 4096; PRAGMA journal_mode = WAL; BEGIN IMMEDIATE");
-      exec(kSchema);
-      exec(("PRAGMA application_id = " + std::to_string(kApplicationId) +
-            "; PRAGMA user_version = " + std::to_string(kSchemaVersion) + "; COMMIT")
-               .c_str());
-      return;
+  bool blank() {
+    return pragma("PRAGMA application_id") == 0 && pragma("PRAGMA user_version") == 0 &&
+           pragma("SELECT count(*) FROM sqlite_schema") == 0;
+  }
+  // The change to a write-ahead log does not wait for another process that makes it, as all else does.
+  void write_ahead() {
+    const std::string sql =
+        "PRAGMA page_size = " + std::to_string(kPageBytes) + "; PRAGMA journal_mode = WAL";
+    for (int ms = 0; ms < kBusyMilliseconds; ms += kRetryMilliseconds) {
+      if ((sqlite3_exec(db_, sql.c_str(), nullptr, nullptr, nullptr) & 0xff) != SQLITE_BUSY) break;
+      std::this_thread::sleep_for(std::chrono::milliseconds(kRetryMilliseconds));
     }
-    if (blank) throw Error(path_, "it is empty", "import a grid into it: patchwork import DB FILE...");
+    exec(sql.c_str());
+  }
+  // On a full disk it may not even be readable.
+  bool holds_nothing() {
+    try {
+      return blank();
+    } catch (const Error&) {
+      std::error_code absent;
+      const std::uintmax_t log = std::filesystem::file_size(path_ + "-wal", absent);
+      const bool no_log = absent || log == 0;
+      return no_log && std::filesystem::file_size(path_, absent) <= kPageBytes;
+    }
+  }
+  void prepare_file(bool may_create) {
+    if (may_create && blank()) {  // pages of 4 KiB: with 8 KiB Puget Sound (1025^2, 16 bit) took 6 % more,
+                                  // above its raw samples
+      write_ahead();
+      begin_write();
+      if (blank()) {  // another process may have been faster
+        exec(kSchema);
+        exec(("PRAGMA application_id = " + std::to_string(kApplicationId) +
+              "; PRAGMA user_version = " + std::to_string(kSchemaVersion))
+                 .c_str());
+      }
+      exec("COMMIT");
+    }
+    const std::int64_t application = pragma("PRAGMA application_id"), version = pragma("PRAGMA user_version");
+    if (blank()) throw Error(path_, "it is empty", "import a grid into it: patchwork import DB FILE...");
     if (application != kApplicationId)
       throw Error(path_, "it is a database of another program", "name a Patchwork database or a new file");
     if (version > kSchemaVersion)
@@ -186,6 +229,7 @@ class SqliteStore : public Store {
   std::string path_;
   std::unique_ptr<sqlite3, Close> connection_;
   sqlite3* db_ = nullptr;  // connection_'s
+  bool made_ = false;      // the file
   std::array<Statements, kShelves.size()> statements_;
 };
 
@@ -199,6 +243,8 @@ SqliteStore::SqliteStore(const std::string& path, StoreMode mode) : path_(path) 
     prepare_file(mode == StoreMode::create);
   } catch (const Error&) {
     const int code = sqlite3_errcode(db_) & 0xff;
+    rollback();
+    if (made_ && holds_nothing()) remove_file();  // who waited for it hears that it is gone
     if (code == SQLITE_NOTADB)
       throw Error(path, "it is not a database", "name a Patchwork database or a new file");
     const bool no_room = code == SQLITE_IOERR || code == SQLITE_FULL || code == SQLITE_CANTOPEN;
@@ -212,6 +258,11 @@ SqliteStore::SqliteStore(const std::string& path, StoreMode mode) : path_(path) 
 
 // A reader that may write closes the file behind it: SQLite then takes -wal and -shm away with the last one.
 void SqliteStore::connect(StoreMode mode, bool frozen) {
+  if (mode == StoreMode::create) {
+    const int made = ::open(path_.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644);
+    made_ = made >= 0;  // else it is there, or SQLite says why it cannot be made
+    if (made_) ::close(made);
+  }
   const bool look_only = frozen || (mode == StoreMode::read && access(path_.c_str(), W_OK) != 0);
   const int flags = look_only ? SQLITE_OPEN_READONLY
                               : SQLITE_OPEN_READWRITE | (mode == StoreMode::create ? SQLITE_OPEN_CREATE : 0);
@@ -266,8 +317,15 @@ void SqliteStore::put_grid(const GridInfo& info, const char* sql) {
 }
 
 GridId SqliteStore::add_grid(const GridInfo& info) {
-  put_grid(info, "INSERT INTO grid(name, digest, facts, checksum, id) VALUES(?, ?, ?, ?, ?)");
-  return {std::uint32_t(sqlite3_last_insert_rowid(db_))};
+  GridInfo added = info;
+  added.id = {std::uint32_t(pragma("SELECT coalesce(max(id), 0) + 1 FROM grid"))};
+  if (added.id.value > GridId::kMost)  // then the least that is free
+    added.id = {std::uint32_t(pragma(
+        "SELECT coalesce(min(id), 0) + 1 FROM (SELECT 0 AS id UNION SELECT id FROM grid) AS taken WHERE "
+        "NOT EXISTS (SELECT 1 FROM grid WHERE id = taken.id + 1)"))};
+  if (added.id.value > GridId::kMost) throw Error(path_, "it holds as many grids as it can");
+  put_grid(added, "INSERT INTO grid(name, digest, facts, checksum, id) VALUES(?, ?, ?, ?, ?)");
+  return added.id;
 }
 
 void SqliteStore::update_grid(const GridInfo& info) {

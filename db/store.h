@@ -66,6 +66,9 @@ class Store {
   /// What is wrong with the file below the level of blobs; empty where nothing is.
   virtual std::vector<std::string> find_damage() = 0;
   virtual std::uint64_t file_bytes() const = 0;
+
+  virtual bool made_file() const = 0;  ///< there was none when it was opened
+  virtual void remove_file() = 0;      ///< REQUIRES: in a write transaction
 };
 
 enum class StoreMode { read, write, create };  ///< create: also makes the file if it is not there

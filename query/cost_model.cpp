@@ -21,6 +21,7 @@ double now() {
 }
 
 double largest_error(const Database& db) {
+  const Database::Reading reading = db.reading();
   double most = 1;
   for (const Grid& g : db.grids())
     if (g.patches.size() > 0) most = std::max(most, 2 * g.patches[g.patches.size() - 1].bottom);
@@ -93,6 +94,7 @@ Budgeted extract_in_time(const Database& db, const CostModel& model, double seco
     if (n % 2) best.error = std::min(most, best.error > 0 ? best.error * kRung : finer);
     best.extraction = extract(db, *cut_at(best.error));
   }
+  best.kept = best.extraction.cost.seconds <= seconds;
   return best;
 }
 

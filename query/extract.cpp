@@ -30,6 +30,8 @@ Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
     if (!last || last->info.id != e.id.grid()) last = &db.grid(e.id.grid());
     const Grid& grid = *last;
     const GridShape::Block block{e.id.level(), e.id.bx(), e.id.by()};
+    if (!grid.info.shape.has(block.level, block.bx, block.by))
+      throw Error(db.path(), "the R-tree names a patch that is not there", "run: patchwork check --repair");
     const std::size_t index = grid.info.shape.index(block.level, block.bx, block.by);
     const PatchRecord& p = grid.patches[index];
     // The tree's boxes are rounded outward; the record decides.
@@ -72,9 +74,10 @@ Budgeted extract_within(const Database& db, const Budget& budget, double most,
   Budgeted best = at(0);
   if (fits(best)) return best;
   best = at(most);
+  best.kept = fits(best);
   // By octaves: errors of a pyramid double from level to level.
   double low = most * kBudgetFinest, high = most;
-  for (int n = 0; n < kBudgetSteps && fits(best); ++n) {
+  for (int n = 0; n < kBudgetSteps && best.kept; ++n) {
     const double middle = std::sqrt(low * high);
     Budgeted tried = at(middle);
     if (fits(tried))

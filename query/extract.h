@@ -54,6 +54,7 @@ struct Budget {
 struct Budgeted {
   double error = 0;  ///< metres or pixels: what was asked for in the end
   Extraction extraction;
+  bool kept = true;  ///< false: not even the largest error keeps to the budget
 };
 /// `cut_at(error)` makes the cut. Searches [0, most] by halving; what it returns keeps to the budget unless
 /// not even `most` does. Throws what cut_at throws.

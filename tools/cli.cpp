@@ -65,13 +65,24 @@ CLI::Validator zero_or_more() {
 void SurfaceOptions::add_to(CLI::App& v) {
   v.add_option("--error", error, "largest error that you accept, metres; 0 means the best there is")
       ->check(zero_or_more());
-  v.add_option("--smoothness", smoothness, "k: derivatives that are continuous")->check(CLI::Range(0, 2));
-  v.add_option("--blend", blend, "how patches are composed")->check(CLI::IsMember({"priority", "weighted"}));
-  v.add_option("--engine", engine, "where the surface is evaluated")->check(CLI::IsMember({"cpu", "vulkan"}));
+  v.add_option("--smoothness", smoothness, "k: derivatives that are continuous")
+      ->check(CLI::Range(0, 2))
+      ->capture_default_str();
+  v.add_option("--blend", blend, "how patches are composed")
+      ->check(CLI::IsMember({"priority", "weighted"}))
+      ->capture_default_str();
+  v.add_option("--engine", engine, "where the surface is evaluated")
+      ->check(CLI::IsMember({"cpu", "vulkan"}))
+      ->capture_default_str();
   v.add_flag("--strict", strict, "no data where the error is not available, instead of the best there is");
 }
 
+void refuse_strict() {
+  throw CLI::ValidationError("--strict", "it needs --error with more than 0 m: no height is without error");
+}
+
 BlendOptions SurfaceOptions::blend_options() const {
+  if (strict && error == 0) refuse_strict();
   return {.smoothness = smoothness,
           .composition = blend == "weighted" ? Composition::weighted : Composition::priority,
           .strict = strict,

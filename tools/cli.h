@@ -81,6 +81,9 @@ struct SurfaceOptions {
   BlendOptions blend_options() const;
 };
 
+/// For --strict with error 0, which no surface has.
+[[noreturn]] void refuse_strict();
+
 /// The engine that the options name. REQUIRES: `db` outlives it. Throws Error: no device, no memory on it.
 std::unique_ptr<Evaluator> make_evaluator(const Database& db, std::span<const PatchId> patches,
                                           const SurfaceOptions& options, std::uint64_t memory);

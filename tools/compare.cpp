@@ -1,7 +1,5 @@
 #include "tools/compare.h"
 
-#include <ogr_spatialref.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -76,14 +74,6 @@ std::optional<Comparison> compare(const Database& db, const RasterSource& source
     fit = normal.completeOrthogonalDecomposition().solve(a.transpose() * (weight.asDiagonal() * d));
   }
   return Comparison{fit[0], fit[1] / scale, fit[2] / scale, sigma, size_t(n)};
-}
-
-bool same_crs(const std::string& a, const std::string& b) {
-  OGRSpatialReference p, q;
-  if (p.SetFromUserInput(a.c_str()) != OGRERR_NONE || q.SetFromUserInput(b.c_str()) != OGRERR_NONE)
-    return a == b;
-  const char* ignore_axes[] = {"IGNORE_DATA_AXIS_TO_SRS_AXIS_MAPPING=YES", nullptr};
-  return p.IsSame(&q, ignore_axes);
 }
 
 }  // namespace patchwork::cli

@@ -21,7 +21,4 @@ struct Comparison {
 /// Nothing where the two do not overlap (fewer than three points). Reported, never applied.
 std::optional<Comparison> compare(const Database& db, const RasterSource& source);
 
-/// Two descriptions of one CRS.
-bool same_crs(const std::string& a, const std::string& b);
-
 }  // namespace patchwork::cli

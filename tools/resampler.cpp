@@ -11,6 +11,10 @@
 
 namespace patchwork::cli {
 
+namespace {
+constexpr int kStrip = 256, kStrips = 32;  // rows at least, and about how often progress is told
+}  // namespace
+
 Raster Raster::covering(const Extent& e, double step) {
   if (!(step > 0) || !std::isfinite(step)) throw Error("step", "it must be a number of metres above 0");
   // A sliver of a pixel that rounding leaves makes no column of its own.
@@ -37,8 +41,8 @@ double finest_step(const Database& db, const Extent& extent) {
 }
 
 Resampler::Resampler(const Evaluator& blend, const Raster& raster, std::vector<std::string> bands,
-                     std::size_t memory)
-    : blend_(blend), raster_(raster), bands_(std::move(bands)) {
+                     std::size_t memory, const std::function<void(double)>& progress)
+    : blend_(blend), raster_(raster), bands_(std::move(bands)), progress_(progress) {
   const std::size_t pixels = size_t(raster.width) * size_t(raster.height);
   if (pixels > memory / 4 / (sizeof(float) * bands_.size())) return;
   for (std::size_t b = 0; b < bands_.size(); ++b) whole_.emplace_back(pixels);
@@ -51,7 +55,7 @@ void Resampler::rows(int factor, int row, int rows, std::span<float* const> band
   } else {
     std::vector<float*> planes;
     for (Buffer<float>& plane : whole_) planes.push_back(plane.data());
-    if (!done_) evaluate(1, 0, raster_.height, planes);
+    if (!done_) evaluate_whole(planes);
     done_ = true;
     const int width = (raster_.width + factor - 1) / factor;
     tbb::parallel_for(0, rows, [&](int r) {
@@ -63,6 +67,17 @@ void Resampler::rows(int factor, int row, int rows, std::span<float* const> band
     });
   }
   tally_.blend_seconds += seconds_since(start);
+}
+
+void Resampler::evaluate_whole(std::span<float* const> planes) {
+  const int step = std::max(kStrip, raster_.height / kStrips + 1);
+  for (int row = 0; row < raster_.height; row += step) {
+    const int rows = std::min(step, raster_.height - row);
+    std::vector<float*> strip(planes.begin(), planes.end());
+    for (float*& plane : strip) plane += std::size_t(row) * std::size_t(raster_.width);
+    evaluate(1, row, rows, strip);
+    if (progress_) progress_(double(row + rows) / raster_.height);
+  }
 }
 
 void Resampler::evaluate(int factor, int row, int rows, std::span<float* const> bands) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -36,13 +37,15 @@ struct ResampleTally {
 /// Fills rows of the bands named (height, bound, source) as float32, NaN (source: 0) where there is no data.
 class Resampler {
  public:
-  /// Evaluates all at once if the raster fits into a quarter of `memory` (bytes), else rows as they are asked
-  /// for.
-  Resampler(const Evaluator& blend, const Raster& raster, std::vector<std::string> bands, std::size_t memory);
+  /// Evaluates all at once, and tells its progress, if the raster fits into a quarter of `memory` (bytes),
+  /// else rows as they are asked for.
+  Resampler(const Evaluator& blend, const Raster& raster, std::vector<std::string> bands, std::size_t memory,
+            const std::function<void(double)>& progress = {});
   void rows(int factor, int row, int rows, std::span<float* const> bands);
   const ResampleTally& tally() const { return tally_; }
 
  private:
+  void evaluate_whole(std::span<float* const> planes);
   void evaluate(int factor, int row, int rows, std::span<float* const> bands);
   const Evaluator& blend_;
   Raster raster_;
@@ -50,6 +53,7 @@ class Resampler {
   ResampleTally tally_;
   std::vector<Buffer<float>> whole_;  // the full resolution, a plane a band, where it fits
   bool done_ = false;
+  std::function<void(double)> progress_;
   std::vector<double> bound_;
   std::vector<std::int32_t> source_;
 };

@@ -1,16 +1,14 @@
 #include "tools/sample_dataset.h"
 
 #include <gdal_priv.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <vector>
 
 #include "db/error.h"
-#include "tools/unfinished_files.h"
+#include "tools/output_file.h"
 
 namespace patchwork {
 
@@ -32,13 +30,9 @@ class SampleWriter {
     GDALAllRegister();
     each_strip(0, [&](int, std::span<const double> strip) { note(strip); });
     choose();
-    const std::string unfinished = path + ".part";
-    UnfinishedFiles files({unfinished});
-    fill(unfinished);
-    std::error_code failed;
-    std::filesystem::rename(unfinished, path, failed);
-    if (failed) throw Error(path, "it cannot be written", failed.message());
-    files.keep();
+    OutputFile file(path);
+    fill(path, file.name());
+    file.publish();
     return GDALGetDataTypeName(type_);
   }
 
@@ -86,7 +80,7 @@ class SampleWriter {
     }
   }
 
-  void fill(const std::string& path) {
+  void fill(const std::string& path, const std::string& name) {
     char** options = nullptr;
     options = CSLSetNameValue(options, "TILED", "YES");
     options = CSLSetNameValue(options, "COMPRESS", "DEFLATE");
@@ -94,7 +88,7 @@ class SampleWriter {
     options = CSLSetNameValue(options, "BIGTIFF", "IF_SAFER");
     CPLPushErrorHandler(CPLQuietErrorHandler);
     GDALDatasetUniquePtr out(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-        path.c_str(), width(), height(), 1, type_, options));
+        name.c_str(), width(), height(), 1, type_, options));
     CSLDestroy(options);
     bool good = out != nullptr;
     if (good) {

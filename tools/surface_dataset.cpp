@@ -2,19 +2,17 @@
 
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>
-#include <unistd.h>
+#include <oneapi/tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <exception>
-#include <filesystem>
 #include <limits>
 #include <memory>
-#include <system_error>
 
 #include "db/error.h"
-#include "tools/unfinished_files.h"
+#include "tools/output_file.h"
 
 // The surface is shown to GDAL as a dataset with overviews whose pixels are made when they are read; its COG
 // driver copies that dataset level by level, coarsest first, in the order of the file. Nothing is computed
@@ -233,25 +231,6 @@ class Pyramid {
   LevelDataset full_;
 };
 
-// A name beside the target, so that the rename stays on one file system.
-class PartialFile {
- public:
-  explicit PartialFile(const std::string& target)
-      : target_(target), name_(target + ".partial-" + std::to_string(getpid())), unfinished_({name_}) {}
-
-  const std::string& name() const { return name_; }
-  void publish() {
-    std::error_code error;
-    std::filesystem::rename(name_, target_, error);
-    if (error) throw Error(target_, "cannot put the finished file in place (" + error.message() + ")");
-    unfinished_.keep();
-  }
-
- private:
-  std::string target_, name_;
-  UnfinishedFiles unfinished_;
-};
-
 void check(const std::string& path, const SurfaceRaster& raster) {
   if (raster.width < 1 || raster.height < 1 || raster.bands.empty())
     throw Error(path, "a raster needs at least one pixel and one band");
@@ -284,7 +263,9 @@ CPLStringList creation_options(const SurfaceRaster& raster) {
   options.SetNameValue("OVERVIEW_COMPRESS", raster.compression.c_str());
   options.SetNameValue("BLOCKSIZE", std::to_string(kTile).c_str());
   options.SetNameValue("BIGTIFF", "IF_SAFER");
-  options.SetNameValue("NUM_THREADS", "ALL_CPUS");
+  using Threads = oneapi::tbb::global_control;  // those that --threads leaves
+  options.SetNameValue("NUM_THREADS",
+                       std::to_string(Threads::active_value(Threads::max_allowed_parallelism)).c_str());
   options.SetNameValue("OVERVIEWS", "FORCE_USE_EXISTING");
   // Level 1: on 4096 x 4096 pixels of Puget Sound level 6 takes twice the time for 3 % (DEFLATE) or 12 %
   // (ZSTD) fewer bytes.
@@ -329,7 +310,7 @@ void write_cog(const std::string& path, const SurfaceRaster& raster, const RowSo
   GDALDriver& driver = cog_driver(path);
   Failure failure;
   Report report{progress, failure};
-  PartialFile file(path);
+  OutputFile file(path);
   Pyramid pyramid(raster, source, failure);
   CPLPushErrorHandlerEx(keep_first_error, &failure);
   if (!pyramid.full().set_crs())

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <csignal>
 #include <utility>
 
@@ -42,8 +43,18 @@ void UnfinishedFiles::remove() const {
   for (const std::string& path : paths_) unlink(path.c_str());
 }
 
+// So are _Fork and execl.
+void UnfinishedFiles::remove_folders() const {
+  for (const std::string& path : paths_)
+    if (!kept_ && unlink(path.c_str()) != 0 && errno == EISDIR && _Fork() == 0) {
+      execl("/bin/rm", "rm", "-rf", path.c_str(), nullptr);
+      _exit(1);
+    }
+}
+
 void UnfinishedFiles::remove_all_and_die(int signal) {
-  for (const UnfinishedFiles* files = innermost; files != nullptr; files = files->outer_) files->remove();
+  for (const UnfinishedFiles* files = innermost; files != nullptr; files = files->outer_)
+    files->remove(), files->remove_folders();
   std::signal(signal, SIG_DFL);
   std::raise(signal);
 }

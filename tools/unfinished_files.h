@@ -7,8 +7,8 @@
 namespace patchwork {
 
 /// Removes the files, where they exist, when it goes out of scope or when SIGINT, SIGTERM or SIGHUP ends the
-/// process, unless keep() was called. Several may live at a time, the last made going first. Not safe for
-/// concurrent use.
+/// process, unless keep() was called; folders with all in them only at a signal, by rm. Several may live at a
+/// time, the last made going first. Not safe for concurrent use.
 class UnfinishedFiles {
  public:
   explicit UnfinishedFiles(std::vector<std::string> paths);
@@ -21,6 +21,7 @@ class UnfinishedFiles {
  private:
   static void remove_all_and_die(int signal);
   void remove() const;
+  void remove_folders() const;
 
   const std::vector<std::string> paths_;
   UnfinishedFiles* const outer_;

@@ -218,4 +218,25 @@ TEST_F(Import, AnInterruptLeavesTheDatabaseAsItWas) {
       << "and it still takes grids";
 }
 
+// Whoever is faster makes the file; the other one waits, and takes nothing away.
+TEST_F(Import, TwoThatMakeOneDatabaseAtATimeLoseNothing) {
+  const std::string a = make(hill_file(400, 300), "a.tif"), b = make(hill_file(300, 400, 300), "b.tif");
+  const auto both = [&](const std::string& db, const char* first, const char* second) {
+    Outcome other;
+    const Outcome one = run({"import", db, a, "--name", first, "--quiet"}, {.meanwhile = [&](pid_t) {
+                              other = run({"import", db, b, "--name", second, "--quiet"});
+                            }});
+    return one.code + other.code;
+  };
+  for (int n = 0; n < 5; ++n) {
+    const std::string two = in_directory("two" + std::to_string(n)),
+                      same = in_directory("same" + std::to_string(n));
+    EXPECT_EQ(both(two, "one", "other"), 0);
+    EXPECT_EQ(json({"list", two, "--json"})["grids"].size(), 2u);
+    EXPECT_EQ(both(same, "one", "one"), 1) << "one of them comes too late";
+    EXPECT_EQ(json({"list", same, "--json"})["grids"].size(), 1u);
+    EXPECT_EQ(run({"check", same}).code, 0);
+  }
+}
+
 }  // namespace patchwork

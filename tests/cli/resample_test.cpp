@@ -133,6 +133,13 @@ TEST_F(Resample, NothingIsWrittenOverTheDatabaseOrHalf) {
   const std::string before = content_hash(database_);
   EXPECT_SAYS(complaint(run({"resample", database_, database_})), "the database itself");
   EXPECT_SAYS(complaint(run(command({"--map", database_}))), "the database itself");
+  for (const Words& words :
+       {Words{"export", database_, "hills", database_}, Words{"render", database_, database_},
+        Words{"render", database_, in_directory("p.png"), "--depth", database_},
+        Words{"accuracy", database_, "--map", database_}})
+    EXPECT_SAYS(complaint(run(words)), "the database itself");
+  const std::string twice = in_directory("twice.tif");
+  EXPECT_SAYS(complaint(run({"resample", database_, twice, "--map", twice})), "two outputs");
   EXPECT_EQ(content_hash(database_), before);
   EXPECT_SAYS(complaint(run({"resample", database_, in_directory("none/out.tif")})), "none/out.tif");
   EXPECT_FALSE(std::filesystem::exists(out_));

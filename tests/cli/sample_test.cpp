@@ -49,7 +49,10 @@ TEST_F(Sample, TakesEveryUsualFormOfAPoint) {
        {"500105 4999895", "500105,4999895\n", "500105;4999895\n", "500105\t4999895\r\n",
         "  500105   4999895  77 name\n", "+500105 4.999895e6\n", "# a comment\n\n500105 4999895\n",
         "x,y\n500105,4999895\n", "x y\r\n500105 4999895\r\n", "name,y,x\na,4999895,500105\n",
-        "\"x\",\"y\",\"z\"\n500105,4999895,3\n", "east north\n500105 4999895\n"}) {
+        "\"x\",\"y\",\"z\"\n500105,4999895,3\n", "east north\n500105 4999895\n", ",x,y\n0,500105,4999895\n",
+        "id,name,x,y,z\n7,,500105,4999895,310\n", "\tx\ty\n0\t500105\t4999895\n",
+        "name,x,y\n\"Lake, 2\",500105,4999895\n", "id Northing Easting\n3 4999895 500105\n",
+        "name;x;y\nLake 2;500105;4999895\n", "# a comment\nx,y\n500105,4999895\n"}) {
     const Words lines = sample(form);
     ASSERT_EQ(lines.size(), 1u) << form;
     EXPECT_EQ(lines[0], want) << form;
@@ -63,7 +66,9 @@ TEST_F(Sample, NamesTheLineThatItCannotRead) {
                                                         {"500105\n", "line 1"},
                                                         {"x,y\n1,2\n\n# c\n3;\n", "line 5"},
                                                         {"1 2\nx y\n", "line 2"},
-                                                        {"1 2\n1.5.5 2\n", "line 2"}}) {
+                                                        {"1 2\n1.5.5 2\n", "line 2"},
+                                                        {"id,x,y\n1,,4999895\n", "line 2"},
+                                                        {"id,x,z\n1,500105,3\n", "no column y"}}) {
     const Outcome o = run({"sample", database_}, {.input = input});
     EXPECT_SAYS(complaint(o), line) << input;
     EXPECT_EQ(lines_of(complaint(o)).size(), 1u) << input;

@@ -120,6 +120,7 @@ std::string checked(const std::string& sql, bool repairs) {
   Database db = Database::open_existing(path);
   const RepairReport r = db.repair();
   EXPECT_EQ(r.remaining.empty(), repairs) << sql << "\n" << problems(r.remaining);
+  EXPECT_TRUE(r.done || r.records + r.strays == 0) << "what is told was kept";
   if (repairs) {
     EXPECT_EQ(answer(path), truth) << sql;
   }
@@ -148,6 +149,10 @@ TEST(Check, NamesWhatIsDamagedAndRepairMakesWhatCanBeDerived) {
   says(checked(tail("payload"), false), "a payload chunk is damaged");
   says(checked("DELETE FROM payload WHERE id = (SELECT max(id) FROM payload)", false), "missing");
   says(checked(tail("records"), false), "a run of patch records is damaged");
+  says(checked(tail("records") +
+                   "; INSERT INTO payload SELECT id + (1 << 52), checksum, data FROM payload LIMIT 1",
+               false),
+       "belong to no grid");
 }
 
 TEST(Damage, AGridWithDamagedRecordsCanGo) {

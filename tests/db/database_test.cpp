@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <numeric>
@@ -423,6 +424,67 @@ TEST(Database, DamageIsReportedWithTheNameOfTheFile) {
   EXPECT_TRUE(says(damaged("DELETE FROM payload WHERE rowid = (SELECT max(id) FROM payload)"), "missing"));
   EXPECT_TRUE(says(damaged("DELETE FROM records"), "missing"));
   EXPECT_NE(damaged("DROP TABLE payload"), "");
+}
+
+// --- Files that come and go, and CRSs.
+
+TEST(Database, AFileIsTakenAwayOnlyWithoutGrids) {
+  const GridFolder folder;
+  {
+    Database empty = folder.database("empty"), full = folder.database("full");
+    EXPECT_TRUE(empty.made_file());
+    Database other = folder.database("full");
+    EXPECT_FALSE(other.made_file());
+    folder.add(other, of_terrain({.width = 40, .height = 40}, rough), "grid");
+    empty.remove_if_empty(), full.remove_if_empty();
+  }
+  for (const char* end : {"", "-wal", "-shm"})
+    EXPECT_FALSE(std::filesystem::exists(folder.path("empty") + end)) << end;
+  EXPECT_EQ(Database::open(folder.path("full")).grids().size(), 1u);
+}
+
+TEST(Database, WhoWritesToAFileThatIsGoneHearsOfIt) {
+  const GridFolder folder;
+  Database db = folder.database();
+  const GridFile file = of_terrain({.width = 40, .height = 40}, rough);
+  folder.add(db, file, "before");
+  std::filesystem::remove(db.path());
+  EXPECT_TRUE(says(refusal_of([&] { folder.add(db, file, "after"); }), "it was removed"));
+}
+
+TEST(Database, TheFirstGridBringsTheCrsAndOneOfAnotherIsRefused) {
+  const GridFolder folder;
+  Database db = folder.database();
+  const std::string path = folder.write(of_terrain({.width = 40, .height = 40}, rough), "grid");
+  const auto add = [&](const char* crs, const std::string& of_database, ImportOptions options) {
+    db.import(RasterSource::open(path, {.crs = crs}, of_database), options);
+  };
+  add("EPSG:32632", "", {.name = "dry", .dry_run = true});
+  EXPECT_EQ(db.crs(), "") << "nothing is kept";
+  add("EPSG:32632", "", {.name = "first"});
+  EXPECT_TRUE(same_crs(db.crs(), "EPSG:32632"));
+  EXPECT_FALSE(same_crs(db.crs(), "EPSG:32633"));
+  EXPECT_TRUE(says(refusal_of([&] { add("EPSG:32633", "", {.name = "other"}); }), "another CRS"));
+  EXPECT_EQ(refusal_of([&] { add("EPSG:32633", db.crs(), {.name = "other"}); }), "") << "warped, it may come";
+  EXPECT_TRUE(same_crs(Database::open(db.path()).crs(), "EPSG:32632"));
+}
+
+TEST(Database, IdsThatAreFreeAreGivenAgainOnceAllWereGiven) {
+  const GridFolder folder;
+  const auto store = open_store(folder.path("ids"), StoreMode::create);
+  store->begin_write();
+  const auto add = [&](std::uint32_t n) {
+    GridInfo g;
+    g.name = std::to_string(n), g.shape = GridShape(2, 2, false);
+    std::memcpy(g.digest.data(), &n, sizeof n);
+    return store->add_grid(g).value;
+  };
+  for (std::uint32_t n = 1; n <= GridId::kMost; ++n) ASSERT_EQ(add(n), n);
+  EXPECT_TRUE(says(refusal_of([&] { add(0); }), "as many grids as it can"));
+  for (const std::uint32_t n : {1u, 77u, GridId::kMost}) {
+    store->remove_grid({n});
+    EXPECT_EQ(add(n), n);
+  }
 }
 
 }  // namespace

@@ -221,9 +221,9 @@ TEST(DegenerateGrids, RefusedOnesLeaveNothingBehind) {
 
 TEST(DegenerateGrids, FramesWithoutAnInverseAreRefused) {
   using Numbers = std::array<double, 6>;
-  for (const Numbers& n :
-       {Numbers{0, 0, 0, 0, 0, -1}, Numbers{0, 1, 0, 0, 0, 0}, Numbers{0, 1, 1, 0, 1, 1},
-        Numbers{0, INFINITY, 0, 0, 0, 1}, Numbers{NAN, 1, 0, 0, 0, 1}, Numbers{0, 1e200, 0, 0, 0, 1e200}}) {
+  for (const Numbers& n : {Numbers{0, 0, 0, 0, 0, -1}, Numbers{0, 1, 0, 0, 0, 0}, Numbers{0, 1, 1, 0, 1, 1},
+                           Numbers{0, INFINITY, 0, 0, 0, 1}, Numbers{NAN, 1, 0, 0, 0, 1},
+                           Numbers{0, 1e200, 0, 0, 0, 1e200}, Numbers{0, 1e-170, 0, 0, 0, -1e-170}}) {
     EXPECT_NE(refusal_of([&] { Frame::from_geotransform(n, "grid"); }), "");
     const double naive = n[0] + n[5] / (n[1] * n[5] - n[2] * n[4]);
     EXPECT_FALSE(std::isfinite(naive) && naive != 0) << "negative control: the plain inverse is of no use";
@@ -281,5 +281,32 @@ TEST(DegenerateGrids, MirroredAxesAndAnyStepKeepSamplesAndExtent) {
     }
 }
 
+TEST(DegenerateGrids, APlaceBeyondAllNumbersIsRefusedAndTheOthersStay) {
+  const GridFolder folder;
+  Database db = folder.database();
+  folder.add(db, heights("1 2 / 3 4"), "good");
+  GridFile far = heights("1 2 / 3 4");
+  far.geotransform[0] = 1.797e308, far.geotransform[1] = 1e305;
+  EXPECT_NE(refusal_of([&] { folder.add(db, far, "far"); }), "");
+  EXPECT_EQ(Database::open(db.path()).grids().size(), 1u);
+}
+
+// What means no data without saying so.
+TEST(DegenerateGrids, HeightsThatReachTooFarAreRefusedWhereTheyCannotBeStored) {
+  const GridFolder folder;
+  Database db = folder.database();
+  GridFile file{.width = 100, .height = 90};
+  file.type = GDT_Float64;
+  file.at = [](int i, int j) {
+    return i == 31 && j == 17 ? std::numeric_limits<double>::lowest() : 300 + std::sin(0.1 * i) + 0.02 * j;
+  };
+  EXPECT_NE(refusal_of([&] { folder.add(db, file, "void"); }).find("--nodata"), std::string::npos);
+  EXPECT_TRUE(db.grids().empty());
+  EXPECT_TRUE(db.check().empty());
+  file.nodata = std::numeric_limits<double>::lowest();
+  folder.add(db, file, "void");
+  EXPECT_TRUE(db.check().empty());
+  EXPECT_GT(db.grids()[0].info.lowest, 298);
+}
 }  // namespace
 }  // namespace patchwork

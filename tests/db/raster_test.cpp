@@ -198,6 +198,14 @@ TEST_F(RasterTest, NodataThatFloatsCannotHoldExactlyStillMatches) {
   }
 }
 
+TEST_F(RasterTest, NodataBeyondAllDoublesMeansTheLowest) {
+  const double lowest = std::numeric_limits<double>::lowest();
+  const auto s = samples(open(make({.type = GDT_Float64, .at = [&](int i, int) { return i ? 1.0 : lowest; }}),
+                              {.nodata = {-INFINITY}}));
+  EXPECT_TRUE(std::isnan(s[0]));
+  EXPECT_EQ(s[1], 1);
+}
+
 TEST_F(RasterTest, NodataThatIntegersCannotHoldMatchesNothing) {
   RasterOptions options{.nodata = {100.5, 1e9, -1}};
   for (const double v : samples(open(make({.type = GDT_Byte, .nodata = 300}), options)))

@@ -277,7 +277,7 @@ TEST_F(SurfaceDataset, RefusesWhatCannotBeWrittenNamingTheFile) {
   EXPECT_NE(refusal(path("x.tif"), raster(9, 9, 0)), "");
   EXPECT_NE(refusal(path("no/such/x.tif"), raster(9, 9)).find("no/such/x.tif: "), std::string::npos);
   fs::create_directories(path("folder/child"));
-  EXPECT_NE(refusal(path("folder"), raster(9, 9)).find("in place"), std::string::npos);
+  EXPECT_NE(refusal(path("folder"), raster(9, 9)).find("it is a folder"), std::string::npos);
   EXPECT_EQ(files(), 2) << "good.tif and the folder, no partial file";
 }
 

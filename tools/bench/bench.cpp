@@ -25,6 +25,7 @@ WorkFolder::WorkFolder(const BenchOptions& options) : path_(options.keep), keep_
   std::string name = (std::filesystem::temp_directory_path() / "patchwork-bench-XXXXXX").string();
   if (!mkdtemp(name.data())) throw Error(name, "a folder cannot be made there", "name one with --keep");
   path_ = name;
+  interrupted_.emplace(std::vector<std::string>{name});
 }
 
 WorkFolder::~WorkFolder() {

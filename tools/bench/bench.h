@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "tools/cli.h"
+#include "tools/unfinished_files.h"
 
 namespace patchwork::cli {
 
@@ -58,6 +60,7 @@ class WorkFolder {
  private:
   std::filesystem::path path_;
   bool keep_;
+  std::optional<UnfinishedFiles> interrupted_;
 };
 
 /// A program of ours: it lies beside this executable.

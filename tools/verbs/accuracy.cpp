@@ -8,6 +8,7 @@
 
 #include "db/error.h"
 #include "tools/cli.h"
+#include "tools/output_file.h"
 #include "tools/resampler.h"
 #include "tools/surface_dataset.h"
 
@@ -35,13 +36,15 @@ void write_map(const Evaluator& surface, const Database& db, const Raster& r, co
   SurfaceRaster d{.width = r.width, .height = r.height, .crs_wkt = db.crs()};
   d.geotransform = {r.xmin, r.step, 0, r.ymax, 0, -r.step};
   d.bands = {{.name = "bound", .unit = "m"}};
-  Resampler resampler(surface, r, {"bound"}, common.memory);
+  ProgressBar bar(common, "accuracy", double(r.width) * r.height / 1e6, "Mpx");
+  const auto show = [&](double share) { bar.show(share); };
+  Resampler resampler(surface, r, {"bound"}, common.memory, show);
   write_cog(
       o.map, d,
       [&](int factor, int row, int rows, std::span<float* const> bands) {
         resampler.rows(factor, row, rows, bands);
       },
-      [](double) {});
+      show);
 }
 
 Json json_of(const Accuracy::Place& p) {
@@ -81,6 +84,7 @@ void print_text(const Accuracy& a, const Database& db) {
 void run(const Options& o, const Common& common) {
   const Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  refuse_overwriting(o.database, {o.map});
   const Region region = o.region.region();
   const bool whole = o.region.extent.empty() && o.region.polygon.empty();
   const Extent extent = whole ? db.extent() : region.bounds();

@@ -67,14 +67,20 @@ void run(Options o, const Common& common) {
 void add_bench(CLI::App& app, Common& common) {
   auto o = std::make_shared<Options>();
   CLI::App* v = verb(app, common, "bench", "the project's own benchmarks, with peers beside it");
+  v->get_option("--threads")->description("threads of both sides; 0 means 2");
   v->add_option("NAME", o->name, "what to measure")->required()->check(CLI::IsMember(names()));
   v->add_option("--file", o->bench.file,
                 "heights to use: to code, integers (codec), to evaluate (blend), to fly over (render)")
       ->check(CLI::ExistingFile);
   v->add_option("--seconds", o->bench.seconds, "how long readers are kept busy (readers only)")
-      ->check(CLI::Range(1, 3600));
-  v->add_option("--size", o->bench.size, "samples along each side")->check(CLI::Range(129, 16385));
-  v->add_option("--runs", o->bench.runs, "measured runs of each side")->check(CLI::Range(1, 1000));
+      ->check(CLI::Range(1, 3600))
+      ->capture_default_str();
+  v->add_option("--size", o->bench.size, "samples along each side")
+      ->check(CLI::Range(129, 16385))
+      ->capture_default_str();
+  v->add_option("--runs", o->bench.runs, "measured runs of each side")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   v->add_option("--keep", o->bench.keep, "folder to work in, which is left as it is");
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });

@@ -1,6 +1,8 @@
 // patchwork check: is everything in a database as it must be, and can it be set right.
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "db/error.h"
 #include "tools/cli.h"
 
@@ -27,13 +29,26 @@ void tell(const std::string& path, const std::vector<Problem>& problems, Json do
 void run(const std::string& path, bool repair, const Common& common) {
   ProgressBar bar(common, "check");
   const auto show = [&](double share) { bar.show(share); };
-  if (!repair) return tell(path, Database::open(path, common.memory).check(show), Json::object(), common);
+  if (!repair) {
+    std::vector<Problem> problems;
+    try {
+      problems = Database::open(path, common.memory).check(show);
+    } catch (const Error& e) {
+      if (!std::filesystem::is_regular_file(path)) throw;
+      problems = {{e.problem(), "file"}};
+    }
+    return tell(path, problems, Json::object(), common);
+  }
   Database db = Database::open_existing(path, common.memory);
   const RepairReport r = db.repair(show);
   if (!common.json && !common.quiet)
-    fmt::print("{}: the R-tree was made anew, {} tops or flags set right, {} stray blobs dropped\n", path,
-               r.records, r.strays);
-  tell(path, r.remaining, {{"repaired", {{"records", r.records}, {"strays", r.strays}}}}, common);
+    fmt::print(
+        "{}: {}\n", path,
+        r.done ? fmt::format("the R-tree was made anew, {} tops or flags set right, {} stray blobs dropped",
+                             r.records, r.strays)
+               : "nothing was changed, because patch records cannot be read");
+  tell(path, r.remaining, {{"repaired", {{"done", r.done}, {"records", r.records}, {"strays", r.strays}}}},
+       common);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include "db/error.h"
 #include "tools/cli.h"
+#include "tools/output_file.h"
 #include "tools/sample_dataset.h"
 
 namespace patchwork::cli {
@@ -22,6 +23,7 @@ const Grid& grid_named(const Database& db, const std::string& name) {
 void run(const Options& o, const Common& common) {
   const auto start = std::chrono::steady_clock::now();
   const Database db = Database::open(o.database, common.memory);
+  refuse_overwriting(o.database, {o.file});
   const Grid& grid = grid_named(db, o.name);
   const double megasamples = double(grid.info.shape.width()) * grid.info.shape.height() / 1e6;
   ProgressBar bar(common, "export " + o.name, megasamples, "Msamples");

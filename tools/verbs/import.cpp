@@ -21,22 +21,6 @@ struct Options {
   bool join = false, dry_run = false;
 };
 
-// A database that this run made is taken away again if nothing came into it.
-class NewFileGuard {
- public:
-  explicit NewFileGuard(const std::string& path) : is_new_(!std::filesystem::exists(path)) {
-    if (is_new_) files_.emplace(std::vector<std::string>{path, path + "-wal", path + "-shm"});
-  }
-  void keep() {
-    if (files_) files_->keep();
-  }
-  bool is_new() const { return is_new_; }
-
- private:
-  bool is_new_;
-  std::optional<UnfinishedFiles> files_;
-};
-
 RasterSource open_source(const Options& o, const std::vector<std::string>& files, const std::string& crs) {
   return files.size() > 1 ? RasterSource::open_joined(files, o.raster, crs)
                           : RasterSource::open(files.front(), o.raster, crs);
@@ -75,9 +59,9 @@ std::string text_of(const ImportReport& r, bool dry_run, const std::optional<Com
   if (!r.duplicate_of.empty())
     return fmt::format("{}: the same grid is there as {} already; nothing to do", r.name, r.duplicate_of);
   std::string text = fmt::format(
-      "{}: {} {} patches ({} redundant), {} of other grids hidden, {} shortened; accuracy {:g} m; {:.2f} s",
+      "{}: {} {} patches ({} redundant), {} of other grids hidden, {} shortened; accuracy {:g} m{}; {:.2f} s",
       r.name, dry_run ? "would add" : "added", r.patches, r.dormant, r.hidden, r.lowered, r.accuracy,
-      r.seconds.total);
+      r.quantisation > 0 ? fmt::format(", stored to within {:g} m", r.quantisation) : "", r.seconds.total);
   text += "\n  where: " + to_text(r.extent);
   if (compared)
     text += fmt::format(
@@ -90,8 +74,7 @@ std::string text_of(const ImportReport& r, bool dry_run, const std::optional<Com
 
 class ImportRun {
  public:
-  ImportRun(const Options& options, const Common& common)
-      : o_(options), common_(common), guard_(options.database) {}
+  ImportRun(const Options& options, const Common& common) : o_(options), common_(common) {}
 
   void run() {
     const bool one_grid = o_.files.size() == 1 || o_.join;
@@ -117,7 +100,7 @@ class ImportRun {
  private:
   Json one(const std::vector<std::string>& files) {
     std::optional<Database> db;
-    if (!guard_.is_new() || opened_) db = Database::open_or_create(o_.database, "", common_.memory);
+    if (std::filesystem::exists(o_.database)) db = Database::open_or_create(o_.database, "", common_.memory);
     if (db && !o_.crs.empty() && db->crs() != o_.crs && !same_crs(db->crs(), o_.crs))
       throw Error(o_.database, "its CRS is not " + o_.crs, "leave --crs out, or make another database");
     const bool settled = db && (!db->grids().empty() || !db->crs().empty());
@@ -126,29 +109,57 @@ class ImportRun {
       throw Error(files.front(), "it has a CRS and the database has none: their places cannot be compared",
                   "make a database with --crs and import its grids there");
     for (const std::string& w : source.warnings()) note(common_, files.front() + ": " + w);
-    if (!settled) db = Database::open_or_create(o_.database, source.crs(), common_.memory);
-    opened_ = true;
+    if (!settled)
+      db = Database::open_or_create(o_.database, "", common_.memory);  // the CRS comes with the grid
     std::optional<Comparison> compared;
-    if (o_.dry_run) compared = compare(*db, source);
+    ImportReport report;
+    try {
+      if (o_.dry_run) compared = compare(*db, source);
+      report = import(*db, source, files);
+    } catch (...) {
+      if (db->made_file()) db->remove_if_empty();
+      throw;
+    }
+    if (o_.dry_run && db->made_file()) db->remove_if_empty();
+    std::vector<std::string> warnings = source.warnings();
+    if (report.quantisation > std::max(report.accuracy, o_.tolerance)) {
+      warnings.push_back(
+          fmt::format("its heights reach so far that they are stored to within {:g} m only: is there a value "
+                      "that means no "
+                      "data? give it with --nodata",
+                      report.quantisation));
+      note(common_, files.front() + ": " + warnings.back());
+    }
+    if (!common_.json && !common_.quiet) fmt::print("{}\n", text_of(report, o_.dry_run, compared));
+    return json_of(report, warnings, compared);
+  }
+
+  ImportReport import(Database& db, const RasterSource& source, const std::vector<std::string>& files) const {
     const std::string stem = std::filesystem::path(files.front()).stem().string();
     const std::string name = !o_.name.empty() ? o_.name : !o_.replace.empty() ? o_.replace : stem;
     const double megasamples = double(source.width()) * source.height() / 1e6;
     ProgressBar bar(common_, "import " + name, megasamples, "Msamples");
-    const ImportReport report = db->import(source, {.name = name,
-                                                    .memory = common_.memory,
-                                                    .dry_run = o_.dry_run,
-                                                    .tolerance = o_.tolerance,
-                                                    .replace = o_.replace,
-                                                    .progress = [&](double share) { bar.show(share); }});
-    if (!o_.dry_run) guard_.keep();
-    if (!common_.json && !common_.quiet) fmt::print("{}\n", text_of(report, o_.dry_run, compared));
-    return json_of(report, source.warnings(), compared);
+    // A database that this run made goes with an interrupt, too, if nothing came into it from elsewhere
+    // before nobody else could write any more: that is when progress begins.
+    std::optional<UnfinishedFiles> unfinished;
+    const ImportReport report = db.import(
+        source,
+        {.name = name,
+         .memory = common_.memory,
+         .dry_run = o_.dry_run,
+         .tolerance = o_.tolerance,
+         .replace = o_.replace,
+         .progress = [&](double share) {
+           if (share == 0 && db.made_file() && db.grids().empty())
+             unfinished.emplace(std::vector<std::string>{db.path(), db.path() + "-wal", db.path() + "-shm"});
+           bar.show(share);
+         }});
+    if (unfinished) unfinished->keep();
+    return report;
   }
 
   const Options& o_;
   const Common& common_;
-  NewFileGuard guard_;
-  bool opened_ = false;
 };
 
 }  // namespace
@@ -162,8 +173,10 @@ void add_import(CLI::App& app, Common& common) {
   v->add_option("--name", o->name,
                 "of the grid; else that of the grid it replaces, else the file's name without its ending");
   v->add_option("--replace", o->replace, "a grid of the database that goes out as this one comes in");
-  v->add_option("--tolerance", o->tolerance,
-                "metres by which a stored height may differ from the file's; 0 keeps them exactly")
+  v->add_option(
+       "--tolerance", o->tolerance,
+       "metres by which a stored height may differ from the file's; 0 keeps integers exactly, and other "
+       "heights exactly or to within a 32nd of the accuracy")
       ->check(zero_or_more());
   v->add_option("--crs", o->crs, "CRS of a new database, e.g. EPSG:32610; projected, in metres");
   v->add_option("--band", o->raster.band, "band that holds the heights, from 1");
@@ -174,7 +187,7 @@ void add_import(CLI::App& app, Common& common) {
       ->check(CLI::IsMember({"m", "ft", "us-ft", "cm"}));
   v->add_option("--vertical-offset", o->raster.vertical_offset, "metres added to every height");
   v->add_flag("--join", o->join, "the files are tiles of one grid");
-  v->add_flag("--dry-run", o->dry_run, "say what would change, and keep nothing");
+  v->add_flag("--dry-run", o->dry_run, "say what would change, each file by itself, and keep nothing");
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { ImportRun(*o, common).run(); });
 }

@@ -32,6 +32,7 @@ struct Asked {
   Extraction extraction;
   double error = 0;
   const char* unit = "m";
+  bool kept = true;  // the budget
 };
 
 ViewCut view_of(const Database& db, const Options& o) {
@@ -46,8 +47,9 @@ ViewCut view_of(const Database& db, const Options& o) {
 }
 
 // The file's values are metres of tolerance.
-FieldCut field_of(const Database& db, const Options& o) {
+FieldCut field_of(const Database& db, const Options& o, const Common& common) {
   const RasterSource file = RasterSource::open(o.field, {.accuracy = 0}, db.crs());
+  for (const std::string& w : file.warnings()) note(common, o.field + ": " + w);
   FieldCut cut{.frame = file.frame(),
                .width = file.width(),
                .height = file.height(),
@@ -70,7 +72,7 @@ struct Question {
   const char* unit = "m";
 };
 
-Question question(const Database& db, const Options& o) {
+Question question(const Database& db, const Options& o, const Common& common) {
   const bool view = !o.eye.empty();
   if (view && (o.error || !o.region.extent.empty() || !o.region.polygon.empty()))
     throw CLI::ValidationError("--eye", "a view brings its own error and region");
@@ -78,8 +80,9 @@ Question question(const Database& db, const Options& o) {
     throw CLI::ValidationError("--field", "a field brings its own error, and has no budget");
   if (!view && !o.error && o.field.empty() && !o.budgeted())
     throw CLI::RequiredError("--error, --eye with --look, --field, --patches, --bytes or --milliseconds");
+  if (o.strict && o.error == 0.) refuse_strict();
   if (!o.field.empty())
-    return {[cut = field_of(db, o)](double) { return make_surface(cut); }, o.outside, o.outside, "m"};
+    return {[cut = field_of(db, o, common)](double) { return make_surface(cut); }, o.outside, o.outside, "m"};
   if (view)
     return {[v = view_of(db, o)](double error) mutable {
               v.pixel_error = error;
@@ -99,11 +102,11 @@ Asked ask(const Database& db, const Options& o, const Question& q) {
   if (!o.budgeted()) return {extract(db, *q.cut_at(q.error), o.strict), q.error, q.unit};
   if (o.milliseconds > 0) {
     const Budgeted b = extract_in_time(db, model_of(db), o.milliseconds / 1000, q.most, q.cut_at);
-    return {b.extraction, b.error, q.unit};
+    return {b.extraction, b.error, q.unit, b.kept};
   }
   const Budget budget{o.patches > 0 ? o.patches : SIZE_MAX, o.bytes > 0 ? o.bytes : SIZE_MAX};
   const Budgeted b = extract_within(db, budget, q.most, q.cut_at);
-  return {b.extraction, b.error, q.unit};
+  return {b.extraction, b.error, q.unit, b.kept};
 }
 
 Json json_of(const Cost& c) {
@@ -155,8 +158,10 @@ Json json_of(const Database& db, PatchId id) {
 
 void print_text(const Database& db, const Asked& asked, const Options& o) {
   const Extraction& x = asked.extraction;
-  fmt::print("{} patches at error {:g} {}: bounds {:.4g} to {:.4g} m", x.patches.size(), asked.error,
-             asked.unit, x.error_available, x.bound_inside);
+  const std::string where =
+      o.field.empty() ? fmt::format("at error {:g} {}", asked.error, asked.unit) : "at the field's errors";
+  fmt::print("{} patches {}: bounds {:.4g} to {:.4g} m", x.patches.size(), where, x.error_available,
+             x.bound_inside);
   if (x.bound_max > x.bound_inside)
     fmt::print(", and up to {:.4g} m in half cells beyond a grid's outer samples", x.bound_max);
   fmt::print("\n");
@@ -164,8 +169,8 @@ void print_text(const Database& db, const Asked& asked, const Options& o) {
   fmt::print("  cost: {} pages and {} boxes of the R-tree, {:.2f} MB of samples, {:.3f} ms\n", x.cost.nodes,
              x.cost.boxes, double(x.cost.bytes) / 1e6, 1000 * x.cost.seconds);
   if (!o.list) return;
-  fmt::print("{:<20} {:>5} {:>9} {:>14} {:>14} {:>9} {:>9}\n", "grid", "level", "block", "x", "y", "bottom",
-             "top");
+  fmt::print("{:<20} {:>5} {:>9} {:>14} {:>14} {:>9} {:>9}\n", "grid", "level", "block", "x, m", "y, m",
+             "bottom, m", "top, m");
   for (const PatchId id : x.patches) {
     const Json j = json_of(db, id);
     fmt::print("{:<20} {:>5} {:>9} {:>14.2f} {:>14.2f} {:>9.4g} {:>9.4g}\n", j["grid"].get<std::string>(),
@@ -176,10 +181,11 @@ void print_text(const Database& db, const Asked& asked, const Options& o) {
 
 void run(const Options& o, const Common& common) {
   const Database db = Database::open(o.database, common.memory);
-  const Question q = question(db, o);
+  const Question q = question(db, o, common);
   if (o.explain) return explain(db, q, common);
   const Asked asked = ask(db, o, q);
   const Extraction& x = asked.extraction;
+  if (!asked.kept) note(common, "the budget is too small for any answer there: this is the smallest one");
   if (!common.json) return print_text(db, asked, o);
   Json j{{"patches", x.patches.size()},
          {"error", asked.error},
@@ -189,6 +195,7 @@ void run(const Options& o, const Common& common) {
          {"bound_max", x.bound_max},
          {"bound_inside", x.bound_inside},
          {"error_available", x.error_available}};
+  if (o.budgeted()) j["within_budget"] = asked.kept;
   j["cost"] = json_of(x.cost);
   if (o.list)
     for (const PatchId id : x.patches) j["list"].push_back(json_of(db, id));
@@ -201,15 +208,26 @@ void add_query(CLI::App& app, Common& common) {
   auto o = std::make_shared<Options>();
   CLI::App* v = verb(app, common, "query", "the patches that an error needs, and what finding them costs");
   v->add_option("DB", o->database, "the database")->required();
-  v->add_option("--error", o->error, "largest error that you accept, metres; 0 means the best there is")
-      ->check(zero_or_more());
+  auto* error =
+      v->add_option("--error", o->error, "largest error that you accept, metres; 0 means the best there is")
+          ->check(zero_or_more());
   auto* eye = v->add_option("--eye", o->eye, "where a view is seen from: x y z, metres")->expected(3);
   v->add_option("--look", o->look, "the point in the middle of the view: x y z")->expected(3)->needs(eye);
   eye->needs("--look");
-  v->add_option("--fov", o->fov, "vertical field of view, degrees");
-  v->add_option("--size", o->size, "of the view: width height, pixels")->expected(2);
-  v->add_option("--pixel-error", o->pixel_error, "largest error that you accept on the screen, pixels")
-      ->check(zero_or_more());
+  v->add_option("--fov", o->fov, "vertical field of view, degrees")
+      ->needs(eye)
+      ->check(CLI::Range(0.001, 179.999))
+      ->capture_default_str();
+  v->add_option("--size", o->size, "of the view: width height, pixels")
+      ->needs(eye)
+      ->expected(2)
+      ->check(above_zero())
+      ->capture_default_str();
+  auto* pixels =
+      v->add_option("--pixel-error", o->pixel_error, "largest error that you accept on the screen, pixels")
+          ->needs(eye)
+          ->check(zero_or_more())
+          ->capture_default_str();
   v->add_flag("--cone", o->cone, "distances in space, not in the plane: fewer patches for an eye high above")
       ->needs(eye);
   v->add_option("--patches", o->patches, "a budget: the smallest error that needs no more patches")
@@ -222,15 +240,21 @@ void add_query(CLI::App& app, Common& common) {
       ->excludes("--bytes");
   v->add_option("--field", o->field, "a raster of errors, metres, that each place may have")
       ->check(CLI::ExistingFile);
-  v->add_option("--outside", o->outside, "the error beyond the field, and where it has no data")
-      ->needs("--field");
+  v->add_option("--outside", o->outside, "the error beyond the field, and where it has no data, metres")
+      ->needs("--field")
+      ->check(zero_or_more())
+      ->capture_default_str();
   v->add_flag("--explain", o->explain, "what the answer will cost, and nothing else")
       ->excludes("--patches")
       ->excludes("--bytes")
       ->excludes("--milliseconds");
   o->region.add_to(*v, true);
-  v->add_flag("--strict", o->strict, "only patches of that error, not the best where it is not available");
-  v->add_flag("--list", o->list, "every patch, in the order in which they speak");
+  auto* strict = v->add_flag("--strict", o->strict,
+                             "only patches of that error, not the best where it is not available");
+  v->add_flag("--list", o->list, "every patch, in the order in which they speak")->excludes("--explain");
+  strict->excludes("--explain");
+  for (const char* budget : {"--patches", "--bytes", "--milliseconds"})  // what it finds is the error
+    for (CLI::Option* asked : {error, pixels, strict}) asked->excludes(budget);
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });
 }

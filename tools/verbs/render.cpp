@@ -8,8 +8,8 @@
 
 #include "db/error.h"
 #include "tools/cli.h"
+#include "tools/output_file.h"
 #include "tools/scene_setup.h"
-#include "tools/unfinished_files.h"
 
 namespace patchwork::cli {
 
@@ -31,20 +31,20 @@ std::string numbered(const std::string& path, int frame) {
 
 void write_depth(const std::string& path, const std::vector<float>& metres, int width, int height) {
   GDALAllRegister();
-  UnfinishedFiles unfinished({path});
+  OutputFile out(path);
   CPLErrorReset();
   GDALDatasetUniquePtr file(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-      path.c_str(), width, height, 1, GDT_Float32, nullptr));
+      out.name().c_str(), width, height, 1, GDT_Float32, nullptr));
   if (!file) throw Error(path, "GDAL cannot make it", "check the folder and its permissions");
   GDALRasterBand& band = *file->GetRasterBand(1);
   band.SetNoDataValue(std::numeric_limits<double>::quiet_NaN());
   band.SetDescription("metres along the ray through the pixel's centre");
   const CPLErr error = band.RasterIO(GF_Write, 0, 0, width, height, const_cast<float*>(metres.data()), width,
                                      height, GDT_Float32, 0, 0, nullptr);
-  file->FlushCache(true);
+  file.reset();  // writes the last blocks
   if (error != CE_None || CPLGetLastErrorType() >= CE_Failure)
     throw Error(path, "it cannot be written in full", "is the disk full?");
-  unfinished.keep();
+  out.publish();
 }
 
 // All frames' numbers together.
@@ -130,7 +130,7 @@ class Film {
     if (o_.stats) per_frame.push_back(facts(s));
     const auto writing = std::chrono::steady_clock::now();
     const auto name = [&](const std::string& path) { return number ? numbered(path, k) : path; };
-    write_png(name(o_.out), renderer_.picture());
+    write_picture(name(o_.out), renderer_.picture());
     if (!o_.depth.empty()) write_depth(name(o_.depth), renderer_.depth(), scene_.width, scene_.height);
     total.write += seconds_since(writing);
   }
@@ -165,6 +165,7 @@ void run(const Options& o, const Common& common) {
   const auto start = std::chrono::steady_clock::now();
   Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  refuse_overwriting(o.database, {o.out, o.depth});
   Scene scene = o.scene.empty() ? default_scene() : read_scene(o.scene);
   if (!o.size.empty()) scene.width = o.size[0], scene.height = o.size[1];
   if (o.pixel_error > 0) scene.pixel_error = o.pixel_error;

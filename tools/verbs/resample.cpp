@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "db/error.h"
 #include "render/hillshade.h"
 #include "render/patch_map.h"
 #include "tools/cli.h"
+#include "tools/output_file.h"
 #include "tools/resampler.h"
 #include "tools/surface_dataset.h"
 
@@ -62,7 +62,7 @@ void draw_hillshade(const Evaluator& blend, const Raster& r, const Options& o, c
   blend.at_pixels(r.frame(), r.width, 0, r.height,
                   {.height = height, .bound = {}, .source = {}, .patch = {}});
   const std::vector<float> shade(height.begin(), height.end());
-  write_png(o.hillshade, hillshade(shade, r.width, r.height, r.step, title(o, x)));
+  write_picture(o.hillshade, hillshade(shade, r.width, r.height, r.step, title(o, x)));
 }
 
 // The middle of a kernel's two sides, metres: what the map shows as the size of a patch.
@@ -108,14 +108,7 @@ void draw_map(const Database& db, const Blend& blend, const Raster& r, const Opt
                       .step_metres = r.step};
   for (const Grid& g : db.grids()) input.grid_names.push_back(g.info.name);
   for (const PatchId id : x.patches) input.outlines.push_back(outline(db, id, r));
-  write_png(o.map, patch_map(input));
-}
-
-// What is written takes the place of a file of that name: the database itself must not be it.
-void refuse_same_file(const std::string& out, const std::string& database) {
-  std::error_code absent;
-  if (std::filesystem::equivalent(out, database, absent))
-    throw Error(out, "it is the database itself", "write to another file");
+  write_picture(o.map, patch_map(input));
 }
 
 // An extent is rounded outward by a hair; a raster whose pixels are to meet a grid's samples must not be.
@@ -128,17 +121,17 @@ void run(const Options& o, const Common& common) {
   const auto start = std::chrono::steady_clock::now();
   const Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
-  for (const std::string& out : {o.out, o.hillshade, o.map}) refuse_same_file(out, o.database);
+  refuse_overwriting(o.database, {o.out, o.hillshade, o.map});
   const Extent extent = o.region.extent.empty() ? to_micrometres(db.extent()) : o.region.region().bounds();
   const Raster raster = Raster::covering(extent, o.step > 0 ? o.step : finest_step(db, extent));
   const double open_seconds = seconds_since(start);
   const Extraction x = extract(db, {.error = o.surface.error, .region = Region::inside(extent)});
   const double fetch_seconds = prefetch(db, x.patches, common.memory);
   const std::unique_ptr<Evaluator> blend = make_evaluator(db, x.patches, o.surface, common.memory);
-  Resampler resampler(*blend, raster, o.bands, common.memory);
   const auto writing = std::chrono::steady_clock::now();
+  ProgressBar bar(common, "resample", double(raster.width) * raster.height / 1e6, "Mpx");
+  Resampler resampler(*blend, raster, o.bands, common.memory, [&](double share) { bar.show(share); });
   {
-    ProgressBar bar(common, "resample", double(raster.width) * raster.height / 1e6, "Mpx");
     write_cog(
         o.out, describe(db, raster, o),
         [&](int factor, int row, int rows, std::span<float* const> bands) {
@@ -184,9 +177,11 @@ void add_resample(CLI::App& app, Common& common) {
       ->check(above_zero());
   v->add_option("--bands", o->bands, "height,bound,source (source: grid number, negative where filled)")
       ->delimiter(',')
-      ->check(CLI::IsMember({"height", "bound", "source"}));
+      ->check(CLI::IsMember({"height", "bound", "source"}))
+      ->capture_default_str();
   v->add_option("--compress", o->compression, "of the GeoTIFF")
-      ->check(CLI::IsMember({"NONE", "DEFLATE", "ZSTD", "LERC"}));
+      ->check(CLI::IsMember({"NONE", "DEFLATE", "ZSTD", "LERC"}))
+      ->capture_default_str();
   v->add_option("--hillshade", o->hillshade, "also draws a shaded relief (PNG)");
   v->add_option("--map", o->map, "also draws which patch and which grid answers where (PNG)");
   v->add_flag("--json", common.json, "one JSON document on stdout");

@@ -1,6 +1,8 @@
 // patchwork sample: points in, heights and their bounds out, any number, as a stream.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstdio>
 #include <iostream>
@@ -20,15 +22,48 @@ struct Options {
   SurfaceOptions surface;
 };
 
-constexpr std::string_view kBlanks = " \t\r,;";
+constexpr std::string_view kBlanks = " \r";
 
-std::string_view next_token(std::string_view& line) {
-  const std::size_t from = line.find_first_not_of(kBlanks);
-  if (from == std::string_view::npos) return line = {}, std::string_view();
-  const std::size_t to = std::min(line.find_first_of(kBlanks, from), line.size());
-  const std::string_view token = line.substr(from, to - from);
-  line.remove_prefix(to);
-  return token;
+std::string_view trimmed(std::string_view text) {
+  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+  return text.substr(0, text.find_last_not_of(kBlanks) + 1);
+}
+
+// The fields of a line, one after the other: between tabs, else between semicolons, else between commas,
+// where empty ones count; else between blanks. Quoted ones may hold what else parts them.
+class Fields {
+ public:
+  explicit Fields(std::string_view line) : left_(trimmed(line)), more_(!left_.empty()) {
+    for (const char c : {',', ';', '\t'})
+      if (left_.find(c) != std::string_view::npos) separator_ = c;
+  }
+
+  bool more() const { return more_; }
+  std::string_view next() {
+    const std::size_t from = !left_.empty() && left_.front() == '"' ? left_.find('"', 1) : 0;
+    const std::size_t to = separator_ ? left_.find(separator_, std::min(from, left_.size()))
+                                      : left_.find_first_of(kBlanks, std::min(from, left_.size()));
+    std::string_view field = trimmed(left_.substr(0, to));
+    more_ = to != std::string_view::npos;
+    left_.remove_prefix(more_ ? to + 1 : left_.size());
+    left_.remove_prefix(std::min(left_.find_first_not_of(kBlanks), left_.size()));
+    if (field.size() > 1 && field.front() == '"' && field.back() == '"')
+      field = field.substr(1, field.size() - 2);
+    return field;
+  }
+
+ private:
+  std::string_view left_;
+  bool more_;
+  char separator_ = 0;  // 0: blanks
+};
+
+// 0 for a column of x, 1 for one of y, -1 for any other.
+int axis_named(std::string_view name) {
+  std::string lower(name);
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (lower == "x" || lower == "easting") return 0;
+  return lower == "y" || lower == "northing" ? 1 : -1;
 }
 
 bool parse(std::string_view token, double& value) {
@@ -44,25 +79,25 @@ class Sampler {
         patches_(extract(db, {.error = o.surface.error}).patches),
         blend_(make_evaluator(db, patches_, o.surface, memory)) {}
 
-  // The first line may be a header: then columns named x and y (or the first two) are taken.
+  // The first line may be a header, which says which columns are x and y.
   void read(std::istream& in) {
     std::string line;
     for (std::size_t number = 1; std::getline(in, line); ++number) {
-      std::string_view rest = line;
+      Fields fields(line);
+      if (!fields.more() || line[0] == '#') continue;
       double values[2];
-      int column = 0, found = 0;
-      bool empty = true;
-      for (std::string_view t = next_token(rest); !t.empty() && found < 2; t = next_token(rest), ++column) {
-        empty = false;
+      int found = 0;
+      for (int column = 0; fields.more() && found < 2; ++column) {
+        const std::string_view field = fields.next();
         const int want = column == columns_[0] ? 0 : column == columns_[1] ? 1 : -1;
-        if (want < 0) continue;
-        if (!parse(t, values[want])) break;
-        ++found;
+        if (want >= 0 && !parse(field, values[want])) break;
+        found += want >= 0;
       }
-      if (empty || line[0] == '#') continue;
       if (found < 2) {
-        if (number == 1 && header(line)) continue;
-        throw Error("line " + std::to_string(number), "it does not start with two numbers x y");
+        if (x_.empty() && counts_.points == 0 && header(line)) continue;
+        throw Error(
+            "line " + std::to_string(number),
+            fmt::format("its columns {} and {} are not two numbers x y", columns_[0] + 1, columns_[1] + 1));
       }
       x_.push_back(values[0]), y_.push_back(values[1]);
       if (x_.size() == kBatch) flush();
@@ -79,15 +114,23 @@ class Sampler {
   }
 
  private:
+  // Columns named x and y, or easting and northing; where there are none, the first two.
   bool header(std::string_view line) {
-    int column = 0;
-    for (std::string_view t = next_token(line); !t.empty(); t = next_token(line), ++column) {
+    if (has_header_) return false;
+    int at[2] = {-1, -1}, column = 0;
+    for (Fields fields(line); fields.more(); ++column) {
+      const std::string_view name = fields.next();
       double number;
-      if (parse(t, number)) return false;
-      if (t == "x" || t == "X" || t == "\"x\"") columns_[0] = column;
-      if (t == "y" || t == "Y" || t == "\"y\"") columns_[1] = column;
+      if (parse(name, number)) return false;
+      const int axis = axis_named(name);
+      if (axis >= 0 && at[axis] < 0) at[axis] = column;
     }
-    return column >= 2;
+    if (column < 2) return false;
+    if ((at[0] < 0) != (at[1] < 0))
+      throw Error("header", fmt::format("it names no column {}", at[0] < 0 ? 'x' : 'y'),
+                  "name the columns x and y, or easting and northing");
+    if (at[0] >= 0) std::copy(at, at + 2, columns_);
+    return has_header_ = true;
   }
 
   void flush() {
@@ -115,6 +158,7 @@ class Sampler {
   std::vector<PatchId> patches_;
   std::unique_ptr<Evaluator> blend_;
   int columns_[2] = {0, 1};
+  bool has_header_ = false;
   std::vector<double> x_, y_, height_, bound_;
   std::vector<std::int32_t> source_;
   BlendCounts counts_;

@@ -56,8 +56,10 @@ void add_selftest(CLI::App& app, Common& common) {
   CLI::App* v =
       verb(app, common, "selftest", "numerical hard cases tried on a database; exit 1 if one fails");
   v->add_option("DB", *path, "the database, which is only read")->required();
-  v->add_option("--tries", o->tries, "points or places of each case")->check(CLI::Range(100, 100'000'000));
-  v->add_option("--seed", o->seed, "of everything random");
+  v->add_option("--tries", o->tries, "points or places of each case")
+      ->check(CLI::Range(100, 100'000'000))
+      ->capture_default_str();
+  v->add_option("--seed", o->seed, "of everything random")->capture_default_str();
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([path, o, &common] { run(*path, *o, common); });
 }

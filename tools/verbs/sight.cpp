@@ -180,9 +180,12 @@ void add_sight(CLI::App& app, Common& common) {
       ->capture_default_str();
   v->add_option("--error", o->error, "largest error that you accept, metres; 0 means the best there is")
       ->check(zero_or_more());
-  v->add_option("--smoothness", o->smoothness, "k: derivatives that are continuous")->check(CLI::Range(0, 2));
+  v->add_option("--smoothness", o->smoothness, "k: derivatives that are continuous")
+      ->check(CLI::Range(0, 2))
+      ->capture_default_str();
   v->add_option("--blend", o->blend, "how patches are composed")
-      ->check(CLI::IsMember({"priority", "weighted"}));
+      ->check(CLI::IsMember({"priority", "weighted"}))
+      ->capture_default_str();
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });
 }

@@ -4,6 +4,7 @@
 
 #include "db/error.h"
 #include "tools/cli.h"
+#include "tools/output_file.h"
 #include "tools/view/viewer.h"
 
 namespace patchwork::cli {
@@ -28,6 +29,7 @@ std::string text_of(const std::string& path) {
 void run(const Options& o, const Common& common) {
   Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  refuse_overwriting(o.database, {o.screenshot});
   const std::string text = o.scene.empty() ? default_scene_text() : text_of(o.scene);
   Scene scene = parse_scene(text, o.scene);
   if (!o.size.empty()) scene.width = o.size[0], scene.height = o.size[1];

@@ -138,7 +138,9 @@ void add_volume(CLI::App& app, Common& common) {
   o->region.add_to(*v, true);
   v->add_option("--step", o->step, "of the pixels that are summed, metres; else the grids' finest step")
       ->check(above_zero());
-  v->add_option("--smoothness", o->smoothness, "k: derivatives that are continuous")->check(CLI::Range(0, 2));
+  v->add_option("--smoothness", o->smoothness, "k: derivatives that are continuous")
+      ->check(CLI::Range(0, 2))
+      ->capture_default_str();
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });
 }

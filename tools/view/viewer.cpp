@@ -11,6 +11,7 @@
 #include "query/extract.h"
 #include "render/tile_cut.h"
 #include "tools/cli.h"
+#include "tools/output_file.h"
 #include "tools/scene_setup.h"
 
 namespace patchwork::cli {
@@ -227,7 +228,8 @@ double Viewer::frame(const WindowInput& input) {
 // A window that rests waits for events and looks at the database now and then.
 void Viewer::run() {
   double wait = 0;
-  for (int frames = 0; options_.frames == 0 || frames < options_.frames;) {
+  int frames = 0;
+  while (options_.frames == 0 || frames < options_.frames) {
     const WindowInput input = window_.look(wait);
     if (!obey(input)) break;
     steer(input);
@@ -236,7 +238,8 @@ void Viewer::run() {
     wait = frame(input);
     ++frames;
   }
-  if (!options_.screenshot.empty()) write_png(options_.screenshot, window_.shown(renderer_, panels_));
+  if (!options_.screenshot.empty() && frames > 0)
+    write_picture(options_.screenshot, window_.shown(renderer_, panels_));
 }
 
 }  // namespace patchwork::cli

@@ -269,10 +269,11 @@ bool Renderer::refresh(Database& db) {
   const bool moved = db.refresh();
   std::vector<Extent> changed;
   bool another_lattice = false;
-  if (moved && !db.grids().empty()) {
+  if (moved) {
     for (const Change& c : db.changed_since(before)) changed.push_back(c.extent);
-    another_lattice = !impl_->lattice.fits(db);
-    if (another_lattice) impl_->lattice = TileLattice::over(db);
+    const bool nothing = db.grids().empty();
+    another_lattice = nothing || !impl_->lattice.fits(db);
+    if (another_lattice && !nothing) impl_->lattice = TileLattice::over(db);
   }
   impl_->supply.release(moved, changed, another_lattice);
   if (moved) impl_->effects.heights_changed(changed);

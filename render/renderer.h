@@ -58,7 +58,8 @@ struct FrameStats {
   double select_ms = 0, extract_ms = 0, send_ms = 0, blend_ms = 0, finish_ms = 0;  ///< on the host
   double light_ms = 0, factors_ms = 0, draw_ms = 0;                                ///< on the card
   double total_ms = 0;
-  std::size_t tiles_drawn = 0, tiles_made = 0, tiles_wanted = 0;  ///< wanted: still missing
+  std::size_t tiles_drawn = 0, tiles_made = 0,
+              tiles_wanted = 0;  ///< wanted: still missing, with room for them
   std::size_t tiles_coarse = 0;  ///< drawn above the asked error, because finer ones are not there yet
   std::size_t tiles_stale = 0;   ///< drawn as the database was, because they are not made anew yet
   bool workers_held = false;     ///< the database is about to move

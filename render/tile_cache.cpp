@@ -1,5 +1,6 @@
 #include "render/tile_cache.h"
 
+#include <algorithm>
 #include <cassert>
 #include <string>
 
@@ -27,6 +28,12 @@ bool TileCache::better_victim(const Node& a, const Node& b) const {
   return a.pixels != b.pixels ? a.pixels < b.pixels : a.used < b.used;
 }
 
+bool TileCache::has_room() const {
+  return !free_.empty() || std::any_of(tiles_.begin(), tiles_.end(), [&](const Slot& s) {
+    return s.known && nodes_.at(s.tile).used != frame_;
+  });
+}
+
 std::uint32_t TileCache::take_slot() {
   if (free_.empty()) {
     std::uint32_t victim = kNoSlot;
@@ -38,7 +45,7 @@ std::uint32_t TileCache::take_slot() {
       if (policy_ == TilePolicy::first) break;
     }
     if (victim == kNoSlot) return kNoSlot;
-    nodes_.at(tiles_[victim].tile).slot = kNoSlot;
+    nodes_.erase(tiles_[victim].tile);
     give_up(victim), ++evictions_;
   }
   const std::uint32_t slot = free_.back();
@@ -61,14 +68,11 @@ void TileCache::put(const TileKey& key, const TileFacts& facts, std::uint32_t sl
 
 // A tile's halo reads a little beyond its border.
 void TileCache::invalidate(const TileLattice& lattice, const Extent& place) {
-  for (auto at = nodes_.begin(); at != nodes_.end();) {
-    const TileKey& key = at->first;
+  for (auto& [key, node] : nodes_) {
     const double halo = lattice.step(key.level);
     Extent e = lattice.bounds(key);
     e.xmin -= halo, e.ymin -= halo, e.xmax += halo, e.ymax += halo;
-    const bool touched = e.meets(place);
-    at->second.stale |= touched;
-    at = touched && at->second.empty ? nodes_.erase(at) : std::next(at);
+    node.stale |= e.meets(place);
   }
 }
 

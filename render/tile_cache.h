@@ -30,13 +30,13 @@ enum class TilePolicy {
 };
 
 /// Nodes of the quadtree that have been made, and the fixed pool of slots. A tile knows its slot and a slot
-/// its tile. No slot that this frame uses is given away. Facts stay when a slot goes.
+/// its tile. No slot that this frame uses is given away.
 class TileCache {
  public:
   static constexpr std::uint32_t kNoSlot = UINT32_MAX;
   struct Node {
     TileFacts facts;
-    std::uint32_t slot = kNoSlot;  ///< none: without data, or evicted
+    std::uint32_t slot = kNoSlot;  ///< none: without data
     std::uint64_t used = 0;        ///< frame
     double pixels = 0;             ///< its error on the screen when last used
     bool empty = false;            ///< nothing answers in it
@@ -50,12 +50,12 @@ class TileCache {
   const Node* find(const TileKey& key) const;
   /// Keeps its slot during this frame. REQUIRES: the node is there.
   void use(const TileKey& key, double pixels);
+  bool has_room() const;  ///< take_slot() would give one
   /// A slot for a tile that is about to be made; kNoSlot where this frame uses all of them.
   std::uint32_t take_slot();
   /// The tile is made. REQUIRES: `slot` was taken, or is kNoSlot for a tile without data.
   void put(const TileKey& key, const TileFacts& facts, std::uint32_t slot);
   /// Tiles that a change of the database reaches will be made anew; until then they are drawn as they are.
-  /// Those without data are forgotten.
   void invalidate(const TileLattice& lattice, const Extent& place);
   void clear();
 

@@ -14,14 +14,16 @@ constexpr std::size_t kRuns = 6, kRun = 64;  // records of a level that are look
 
 double step_of(const GridInfo& g) { return std::min(g.frame.step_i(), g.frame.step_j()); }
 
-// Bottoms of some patches of a level.
+// Bottoms of some patches of a level, but for those of flat ground, which say nothing of what the level
+// misses.
 void sample_bottoms(const Grid& grid, int level, std::vector<double>& bottoms) {
   const GridShape& shape = grid.info.shape;
   const std::size_t first = shape.index(level, 0, 0);
   const std::size_t n = std::size_t(shape.blocks_i(level)) * std::size_t(shape.blocks_j(level));
+  const double flat = grid.info.accuracy + grid.info.quantisation;
   const auto take = [&](std::size_t k) {
     const PatchRecord p = grid.patches[first + k];
-    if (p.exists()) bottoms.push_back(p.bottom);
+    if (p.exists() && p.bottom > flat) bottoms.push_back(p.bottom);
   };
   if (n <= kRuns * kRun) {
     for (std::size_t k = 0; k < n; ++k) take(k);

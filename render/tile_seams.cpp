@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_set>
 
 namespace patchwork {
 
@@ -27,6 +28,18 @@ class SeamMaker {
       : lattice_(lattice), selection_(selection), cache_(cache), eye_(eye) {}
 
   void make(std::vector<TileDraw>& draws) {
+    holed_.assign(selection_.leaves.size(), false);
+    bool any = false;
+    for (const std::uint32_t k : selection_.drawn)
+      any |= holed_[k] = node(selection_.leaves[k].key).facts.holes;
+    fill(draws);
+    if (any && spread_holes(draws)) fill(draws);
+  }
+
+ private:
+  const TileCache::Node& node(const TileKey& key) const { return *cache_.find(key); }
+
+  void fill(std::vector<TileDraw>& draws) {
     order();
     const auto origin = half_cell_at(lattice_, eye_);
     draws.resize(order_.size());
@@ -36,15 +49,31 @@ class SeamMaker {
       const TileFacts& facts = node(key).facts;
       draw.x = lattice_.first_x(key) - origin[0], draw.y = lattice_.first_y(key) - origin[1];
       draw.stride = 1u << key.level, draw.slot = node(key).slot;
-      draw.reducible = float(facts.reducible), draw.holes = facts.holes, draw.patches = float(facts.patches);
+      draw.reducible = float(facts.reducible), draw.holes = holed_[order_[d]],
+      draw.patches = float(facts.patches);
       for (int c = 0; c < 4; ++c)
         draw.corners[std::size_t(c)] = owner(key.level, key.x + (c & 1), key.y + (c >> 1));
       for (int s = 0; s < 4; ++s) make_side(key, s, draw);
     }
   }
 
- private:
-  const TileCache::Node& node(const TileKey& key) const { return *cache_.find(key); }
+  // A tile without holes may share vertices of one that has some. True if there is such a tile.
+  bool spread_holes(const std::vector<TileDraw>& draws) {
+    std::unordered_set<std::uint32_t> slots;  // of tiles with holes
+    for (const TileDraw& draw : draws)
+      if (draw.holes) slots.insert(draw.slot);
+    bool spread = false;
+    for (std::size_t d = 0; d < draws.size(); ++d) {
+      const TileDraw& draw = draws[d];
+      if (draw.holes) continue;
+      const auto holed = [&](std::uint32_t at) { return slots.contains(at / (kVertices * kVertices)); };
+      bool reads = std::any_of(draw.corners.begin(), draw.corners.end(), holed) ||
+                   std::any_of(draw.middles.begin(), draw.middles.end(), holed);
+      for (const TileDraw::Side& s : draw.sides) reads |= holed(s.near) || holed(s.far);
+      if (reads) holed_[order_[d]] = spread = true;
+    }
+    return spread;
+  }
 
   void order() {
     order_ = selection_.drawn;
@@ -54,9 +83,8 @@ class SeamMaker {
       distance_[k] = std::hypot(std::max({e.xmin - eye_.x, eye_.x - e.xmax, 0.0}),
                                 std::max({e.ymin - eye_.y, eye_.y - e.ymax, 0.0}));
     }
-    const auto holes = [&](std::uint32_t k) { return node(selection_.leaves[k].key).facts.holes; };
     std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
-      if (holes(a) != holes(b)) return holes(b);
+      if (holed_[a] != holed_[b]) return bool(holed_[b]);
       return distance_[a] != distance_[b] ? distance_[a] < distance_[b] : a < b;
     });
     draw_of_.assign(selection_.leaves.size(), TileDraw::kAlone);
@@ -151,6 +179,7 @@ class SeamMaker {
   Point eye_;
   std::vector<std::uint32_t> order_, draw_of_;  // places of leaves by draw; draws by place
   std::vector<double> distance_;
+  std::vector<bool> holed_;  // leaves that may have a vertex without data
 };
 
 }  // namespace

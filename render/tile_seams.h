@@ -47,8 +47,8 @@ struct MeshVertex {
   std::int32_t x, y;
 };
 
-/// A draw for each drawn leaf: those without holes, then those with some, nearest to the eye first. `draws`
-/// is overwritten.
+/// A draw for each drawn leaf: those without holes, then those that have some or share their vertices,
+/// nearest to the eye first. `draws` is overwritten.
 void make_draws(const TileLattice& lattice, const Selection& selection, const TileCache& cache, Point eye,
                 std::vector<TileDraw>& draws);
 

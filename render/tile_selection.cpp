@@ -45,16 +45,18 @@ class Selector {
   void add(const TileKey& key, const TileCache::Node& node) {
     const Box3 box{lattice_.bounds(key), node.facts.lowest, node.facts.highest};
     Selection::Leaf leaf{key};
-    leaf.drawn = !node.empty && frustum_.sees(box);
+    // What finer tiles show may stick out of what this one knows by its error.
+    const Box3 around{box.place, box.lowest - node.facts.error, box.highest + node.facts.error};
+    leaf.drawn = !node.empty && frustum_.sees(around);
     if (leaf.drawn)
       leaf.pixels = node.facts.error > 0 ? node.facts.error * frustum_.pixels_per_metre(box) : 0;
     const auto place = std::uint32_t(out_.leaves.size());
     out_.leaves.push_back(leaf);
     out_.tiles[key] = place;
     if (!node.empty) cache_.use(key, leaf.pixels);
+    if (node.stale && (leaf.drawn || node.empty)) stale_.push_back(place);
     if (!leaf.drawn) return;
     ++drawn_;
-    if (node.stale) stale_.push_back(place);
     if (leaf.pixels <= options_.pixel_error || key.level == 0) return;
     queue_.push_back(place);
     std::push_heap(queue_.begin(), queue_.end(), worse());
@@ -89,6 +91,7 @@ class Selector {
     if (!children_are_there(key, pixels)) return false;
     for (int s = 0; s < 4; ++s)
       if (!make_room(key.beside(s), pixels)) return false;
+    if (drawn_ + 3 > options_.most_tiles) return false;  // its neighbours may have taken what was left
     out_.leaves[place].drawn = false, --drawn_;
     out_.tiles[key] = Selection::kSplit;
     for (int c = 0; c < 4; ++c) add(key.child(c), *cache_.find(key.child(c)));
@@ -100,7 +103,10 @@ class Selector {
   void want_stale() {
     for (const std::uint32_t k : stale_) {
       const Selection::Leaf& leaf = out_.leaves[k];
-      want(leaf.key, leaf.drawn ? std::min(leaf.pixels, options_.pixel_error) : -1);
+      const bool split = out_.tiles.at(leaf.key) == Selection::kSplit;
+      want(leaf.key, leaf.drawn ? std::min(leaf.pixels, options_.pixel_error)
+                     : split    ? -1
+                                : options_.pixel_error);
     }
   }
 

@@ -61,18 +61,17 @@ bool TileSupply::make(std::vector<TileKey> tiles) {
   return made > 0;
 }
 
-// As many as the time allows, one at least; the root is awaited, because nothing could be drawn without it.
-void TileSupply::make_fetched() {
-  if (!wanted_.empty() && wanted_.front() == lattice_.root()) {
-    make({lattice_.root()});
-    return;
-  }
+// As many as the time allows, one at least; the root is awaited where nothing could be drawn without it.
+// False if nothing could be made.
+bool TileSupply::make_fetched() {
+  if (!cache_.find(lattice_.root())) return make({lattice_.root()});
   const auto most = std::size_t(std::max(1.0, options_.make_ms / ms_a_tile_));
   const std::vector<TileKey> fetched = fetcher_->take(wanted_, most);
-  if (fetched.empty()) return;
+  if (fetched.empty()) return false;
   const auto start = std::chrono::steady_clock::now();
-  make(fetched);
+  if (!make(fetched)) return false;
   ms_a_tile_ += 0.2 * (ms_since(start) / double(fetched.size()) - ms_a_tile_);
+  return true;
 }
 
 const Selection& TileSupply::update(const Frustum& frustum, FrameStats& stats) {
@@ -80,14 +79,15 @@ const Selection& TileSupply::update(const Frustum& frustum, FrameStats& stats) {
   cache_.begin_frame();
   select(frustum, stats);
   if (fetcher_) {
+    // Without a slot to be had, what would be fetched could not be made.
+    if (!cache_.has_room()) wanted_.clear();
     fetcher_->want(wanted_);
-    make_fetched();
-    if (maker_.counts().tiles != before.tiles || selection_.drawn.empty()) select(frustum, stats);
+    if (make_fetched() || selection_.drawn.empty()) select(frustum, stats);
   } else {
     while (!wanted_.empty() && make(wanted_)) select(frustum, stats);
   }
   note_made(before, maker_.counts(), stats);
-  stats.tiles_wanted = selection_.wanted.size();
+  stats.tiles_wanted = cache_.has_room() ? selection_.wanted.size() : 0;
   // Blocks of better tiles are simplified until they too just keep to what was asked.
   if (!selection_.drawn.empty()) stats.pixels_reached = std::max(selection_.pixels, options_.pixel_error);
   for (const std::uint32_t k : selection_.drawn) {

@@ -34,7 +34,7 @@ class TileSupply {
  private:
   void select(const Frustum& frustum, FrameStats& stats);
   bool make(std::vector<TileKey> tiles);
-  void make_fetched();
+  bool make_fetched();
 
   const TileLattice& lattice_;
   RendererOptions options_;

@@ -1,5 +1,7 @@
 #include "render/vulkan/graphics_impl.h"
 
+#include "db/error.h"
+
 namespace patchwork::vk {
 
 namespace {
@@ -49,6 +51,8 @@ OwnedPipeline make_graphics(const Bindings& bindings, VkRenderPass pass, const G
     stage.pSpecializationInfo = &special;
     stages.push_back(stage);
   }
+  if (state.lines && !device.features.fillModeNonSolid)
+    throw Error(device.name, "it cannot draw the edges of triangles", "leave out the wireframe");
   const Fixed fixed;
   VkPipelineInputAssemblyStateCreateInfo assembly{};
   assembly.sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO;

@@ -98,10 +98,11 @@ std::size_t LightMap::samples_left() const {
 }
 
 void LightMap::take_heights(const Database& db, int smoothness, double ms) {
+  if (db.grids().empty()) return;
   const auto start = std::chrono::steady_clock::now();
   const Extent e = db.extent();
   const double longest = std::max(e.xmax - e.xmin, e.ymax - e.ymin);
-  const int side = std::clamp(int(longest / finest_step(db)) + 1, 2, kSide);
+  const int side = int(std::clamp(longest / finest_step(db) + 1, 2., double(kSide)));
   const effects::ReliefShape shape = effects::ReliefShape::over(e, side);
   if (!heights_ || !(heights_->shape == shape)) {
     heights_ =

@@ -65,19 +65,15 @@ void main() {
   // A mesh of a disc has so many triangles: two for each vertex inside, one for each on its rim, less two.
   const int rim = bitCount(all.x) + bitCount(all.y), inner = bitCount(own.inside.x) + bitCount(own.inside.y);
   const uint triangles = own.seen ? uint(2 * max(inner, rim > 0 ? 1 : 0) + rim + 2) : 0;
-  edges[d * 64 + k] = uvec4(all, triangles, 0);
   block_triangles[k] = triangles;
   barrier();
   uint row = 0;
   for (int j = 0; k < kBlocks && j < kBlocks; ++j) row += block_triangles[kBlocks * k + j];
   if (k < kBlocks) rows[k] = row;
   barrier();
-  if (k >= kBlocks) return;
   uint before = 0;
-  for (int j = 0; j < k; ++j) before += rows[j];
-  if (k == kBlocks - 1) counts[d] = before + row;
-  for (int j = kBlocks * k; j < kBlocks * (k + 1); ++j) {
-    edges[d * 64 + j].w = before;
-    before += block_triangles[j];
-  }
+  for (int j = 0; j < b.y; ++j) before += rows[j];
+  for (int j = kBlocks * b.y; j < k; ++j) before += block_triangles[j];
+  edges[d * 64 + k] = uvec4(all, triangles, before);
+  if (k == 63) counts[d] = before + triangles;
 }

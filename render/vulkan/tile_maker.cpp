@@ -48,8 +48,9 @@ Tile sampled_tile(const TileLattice& lattice, const TileKey& key) {
 // What a tile's patches say of it: do they come of one grid, and what do samples miss between them.
 struct PatchFacts {
   std::size_t patches = 0;
-  double accuracy = 0;   // metres: of the grid, where there is only one
-  double unsampled = 0;  // metres
+  double accuracy = 0;                            // metres: of the grid, where there is only one
+  double unsampled = 0;                           // metres
+  double lowest = INFINITY, highest = -INFINITY;  // of their grids, metres
 };
 
 // A patch with cells smaller than the distance of samples may stick out between these by as much as it
@@ -78,6 +79,8 @@ PatchFacts facts_of(const Database& db, const std::vector<Blend::Placed>& placed
     const Grid& grid = db.grid(p.id.grid());
     several |= only && only != &grid;
     only = &grid, ++f.patches;
+    f.lowest = std::min(f.lowest, grid.info.lowest - grid.info.rim_error);
+    f.highest = std::max(f.highest, grid.info.highest + grid.info.rim_error);
     f.unsampled = std::max(f.unsampled, missed(grid, p.id, spacing));
   }
   if (only && !several) f.accuracy = only->info.accuracy + only->info.quantisation;
@@ -171,6 +174,8 @@ struct TileMaker::Impl {
     TileFacts f;
     const double shift = blend->impl().base;
     f.lowest = double(s[0]) + shift, f.highest = double(s[1]) + shift;
+    // All of its data may lie between its samples.
+    if (!(f.lowest <= f.highest)) f.lowest = patches.lowest, f.highest = patches.highest;
     f.bound = double(s[3]), f.holes = s[4] > 0, f.patches = patches.patches;
     f.reducible = patches.unsampled + (improvable ? std::max(0.0, f.bound - patches.accuracy) : 0);
     f.error = double(s[2]) + f.reducible;
@@ -229,6 +234,10 @@ std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tile
   for (const TileKey& k : tiles) places.push_back(with_halo(lattice, k));
   const Extraction x = extract(db, TileCut(lattice.error(level), places));
   counts.extract_ms += ms_since(start);
+  if (x.patches.empty()) {
+    for (const TileKey& k : tiles) made.push_back({k, {}, TileCache::kNoSlot});
+    return made;
+  }
   const auto sending = std::chrono::steady_clock::now();
   use(x.patches);
   counts.send_ms += ms_since(sending);

@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "render/tile_seams.h"
 #include "tests/hard_case.h"
 #include "tests/render/terrain_views.h"
 
@@ -15,6 +16,13 @@ std::vector<std::uint32_t> bits(const std::vector<float>& v) {
   std::vector<std::uint32_t> b(v.size());
   std::memcpy(b.data(), v.data(), 4 * v.size());
   return b;
+}
+
+// Pixels that show terrain.
+std::size_t covered(const Renderer& r) {
+  std::size_t n = 0;
+  for (const float d : r.depth()) n += !std::isnan(d);
+  return n;
 }
 
 class InsertionTest : public VulkanTest {
@@ -81,12 +89,7 @@ TEST_F(InsertionTest, OneBesideAllDataIsSeen) {
   const Extent e = db.extent();
   const Camera camera{{e.xmax + 200, 800, 900}, {e.xmax + 201, 800, 300}, 40, kWidth, kHeight};
   r.draw(camera);
-  const auto covered = [&] {
-    std::size_t n = 0;
-    for (const float d : r.depth()) n += !std::isnan(d);
-    return n;
-  };
-  const std::size_t before = covered();
+  const std::size_t before = covered(r);
   {
     Database writer = folder_.database();
     GridFile file = surveys()[0];
@@ -95,7 +98,7 @@ TEST_F(InsertionTest, OneBesideAllDataIsSeen) {
   }
   EXPECT_TRUE(r.refresh(db));
   r.draw(camera);
-  EXPECT_GT(covered(), before + 1000);
+  EXPECT_GT(covered(r), before + 1000);
 }
 
 TEST_F(InsertionTest, AskingForWhatIsNewHoldsNoWorkerUnlessThereIsSome) {
@@ -198,6 +201,75 @@ TEST_F(InsertionTest, InRealTimeAFlightReachesTheSamePicture) {
   EXPECT_EQ(last.tiles_wanted, 0u);
   EXPECT_LE(last.pixels_reached, 1);
   EXPECT_EQ(bits(flies.depth()), bits(waits.depth()));
+}
+
+TEST_F(InsertionTest, OnceTheLastGridIsGoneNothingIsDrawnUntilAnotherComes) {
+  Database db = reader();
+  RendererOptions options{.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20};
+  options.effects.sun = effects::Sun{}, options.effects.shadow = effects::Shadow{};
+  options.effects.sky = effects::Sky{};
+  Renderer r(test_device(), db, options);
+  const Camera camera{{800, -200, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+  r.draw(camera);
+  const std::size_t before = covered(r);
+  EXPECT_GT(before, 1000u);
+  {
+    Database writer = folder_.database();
+    writer.remove("base");
+  }
+  EXPECT_TRUE(r.refresh(db));
+  EXPECT_EQ(r.draw(camera).tiles_drawn, 0u);
+  EXPECT_EQ(covered(r), 0u);
+  insert(0);
+  EXPECT_TRUE(r.refresh(db));
+  r.draw(camera);
+  EXPECT_EQ(covered(r), before);
+}
+
+// Tiles whose data go are drawn as they were until they are made anew, and then no more.
+TEST_F(InsertionTest, InRealTimeOneThatGoesLeavesNoTileWithoutASlot) {
+  const double beyond = reader().extent().xmax;
+  {
+    Database writer = folder_.database();
+    GridFile file = surveys()[0];
+    file.geotransform[0] = beyond + 100;
+    folder_.add(writer, file, "survey9");
+  }
+  Database db = reader();
+  RendererOptions options{.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20};
+  options.realtime = true, options.make_ms = 1;
+  Renderer r(test_device(), db, options);
+  const Camera camera{{beyond + 900, 800, 1500}, {beyond + 901, 800, 300}, 60, kWidth, kHeight};
+  FrameStats last = r.draw(camera);
+  for (int n = 0; n < 5000 && last.tiles_wanted > 0; ++n) last = r.draw(camera);
+  const std::size_t before = covered(r);
+  EXPECT_GT(before, 1000u);
+  remove(9);
+  bool moved = false;
+  for (int n = 0; n < 5000 && (!moved || last.tiles_wanted > 0 || last.tiles_stale > 0); ++n) {
+    moved |= r.refresh(db), last = r.draw(camera);
+    for (const TileDraw& d : r.drawn().draws) ASSERT_LT(d.slot, r.cache().slots());
+  }
+  EXPECT_TRUE(moved);
+  EXPECT_LT(covered(r), before / 2);
+}
+
+// No sample of the root hits a survey.
+TEST_F(InsertionTest, SurveysFarApartAreSeen) {
+  const GridFolder folder;
+  Database db = folder.database();
+  GridFile file = surveys()[0];
+  const double x = file.geotransform[0], y = file.geotransform[3];
+  folder.add(db, file, "one");
+  file.geotransform[0] += 9e5, file.geotransform[3] += 3e5;
+  folder.add(db, file, "other");
+  Renderer r(test_device(), db, {.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20});
+  for (const Point at : {Point{x, y}, Point{x + 9e5, y + 3e5}}) {
+    const FrameStats stats =
+        r.draw({{at.x + 800, at.y - 800, 1500}, {at.x + 801, at.y - 800, 300}, 40, kWidth, kHeight});
+    EXPECT_GT(covered(r), std::size_t(kWidth * kHeight) / 2);
+    EXPECT_LE(stats.pixels_reached, 1);
+  }
 }
 
 }  // namespace

@@ -118,7 +118,7 @@ TEST(TileCache, TheLeastRecentlyUsedGoesFirst) {
   cache.begin_frame();
   cache.put(c, {}, cache.take_slot());
   EXPECT_TRUE(cache.find(a)->drawable());
-  EXPECT_FALSE(cache.find(b)->drawable());
+  EXPECT_EQ(cache.find(b), nullptr);
 }
 
 // A cache in which tiles of random roughness exist, to a random depth, whatever the terrain.
@@ -145,7 +145,7 @@ class Woods {
       cache.put(key, {}, TileCache::kNoSlot);
       return;
     }
-    TileFacts f{.lowest = 200, .highest = 400};
+    TileFacts f{.lowest = 200, .highest = 400, .holes = (key.x + 3 * key.y + key.level) % 11 == 0};
     f.error = lattice_.step(key.level) * 0.1 * (0.2 + double(random_() % 100) / 50);
     cache.put(key, f, cache.take_slot());
     if (key.level > lattice_.levels() - 7 && chance(share))
@@ -243,6 +243,22 @@ TEST(TileSelection, WhatIsTooRoughIsWantedAndTheErrorReachedIsTold) {
   EXPECT_GE(few.pixels, s.pixels) << "a smaller pool is a coarser picture, and says so";
 }
 
+TEST(TileSelection, NeverDrawsMoreThanItMay) {
+  const std::uint64_t seed = test_seed(19);
+  std::size_t full = 0;
+  for (std::uint64_t n = 0; n < 60; ++n) {
+    Woods woods(seed + n);
+    const Frustum frustum(woods.camera());
+    for (std::size_t most = 4; most < 80; most += 3) {
+      Selection s;
+      select_tiles(woods.lattice(), frustum, {.pixel_error = 1e-6, .most_tiles = most}, woods.cache, s);
+      ASSERT_LE(s.drawn.size(), most);
+      full += s.drawn.size() + 3 > most;
+    }
+  }
+  EXPECT_GT(full, 300u) << "and takes what it may";
+}
+
 // A change makes stale what it touches. Of that, what is in sight is wanted: behind all that is missing, and
 // what is not drawn itself at last.
 TEST(TileSelection, WhatAChangeTouchesIsWantedBehindWhatIsMissing) {
@@ -255,8 +271,6 @@ TEST(TileSelection, WhatAChangeTouchesIsWantedBehindWhatIsMissing) {
     const SelectionOptions options{.pixel_error = 1};
     select_tiles(woods.lattice(), frustum, options, woods.cache, before);
     const Extent change{500, 600, 900, 1100};
-    // Empty tiles would be forgotten: they are left out of this.
-    bool some_empty = false;
     std::set<TileKey> stale;
     for (const auto& [key, place] : before.tiles) {
       Extent e = woods.lattice().bounds(key);
@@ -264,11 +278,10 @@ TEST(TileSelection, WhatAChangeTouchesIsWantedBehindWhatIsMissing) {
       e.xmin -= halo, e.ymin -= halo, e.xmax += halo, e.ymax += halo;
       if (!e.meets(change)) continue;
       const TileCache::Node& node = *woods.cache.find(key);
-      some_empty |= node.empty;
-      if (frustum.sees({woods.lattice().bounds(key), node.facts.lowest, node.facts.highest}))
-        stale.insert(key);
+      const Box3 around{woods.lattice().bounds(key), node.facts.lowest - node.facts.error,
+                        node.facts.highest + node.facts.error};
+      if (node.empty || frustum.sees(around)) stale.insert(key);
     }
-    if (some_empty) continue;
     woods.cache.invalidate(woods.lattice(), change);
     select_tiles(woods.lattice(), frustum, options, woods.cache, after);
     EXPECT_EQ(after.tiles.size(), before.tiles.size()) << "old tiles are drawn meanwhile";
@@ -342,6 +355,39 @@ TEST(EdgeSplit, WhoeverSharesAVertexReadsTheSameTexel) {
   report_law("EdgeSplit", "whoever shares a vertex reads the same texel", std::uint64_t(shared));
   report_control("EdgeSplit", "halves of seams read their ends themselves", std::uint64_t(shared), apart, 0,
                  "vertices");
+}
+
+// Its fragments must be asked whether they have data.
+TEST(TileSeams, WhoSharesAVertexWithATileWithHolesCountsAsOneWithHoles) {
+  const std::uint64_t seed = test_seed(21);
+  std::size_t own = 0, shared = 0, solid = 0;
+  for (std::uint64_t n = 0; n < 20; ++n) {
+    Woods woods(seed + n);
+    const Camera camera = woods.camera();
+    Selection s;
+    select_tiles(woods.lattice(), Frustum(camera), {.pixel_error = 1}, woods.cache, s);
+    std::vector<TileDraw> draws;
+    make_draws(woods.lattice(), s, woods.cache, {camera.eye.x, camera.eye.y}, draws);
+    std::set<std::uint32_t> holed;
+    for (const std::uint32_t k : s.drawn) {
+      const TileCache::Node& node = *woods.cache.find(s.leaves[k].key);
+      if (node.facts.holes) holed.insert(node.slot);
+    }
+    EXPECT_TRUE(std::is_sorted(draws.begin(), draws.end(),
+                               [](const TileDraw& a, const TileDraw& b) { return a.holes < b.holes; }));
+    for (const TileDraw& d : draws) {
+      bool reads = holed.contains(d.slot);
+      for (int side = 0; side < 4; ++side)
+        for (int t = 0; t <= 128; ++t)
+          if (t % 2 == 0 || d.sides[std::size_t(side)].fine >> (t > 64) & 1)
+            reads |= holed.contains(seam_texel(d, side, t) / (65 * 65));
+      ASSERT_EQ(d.holes != 0, reads);
+      own += holed.contains(d.slot), shared += reads && !holed.contains(d.slot), solid += !reads;
+    }
+  }
+  EXPECT_GT(own, 20u);
+  EXPECT_GT(shared, 20u);
+  EXPECT_GT(solid, 20u);
 }
 
 // What a block at a border needs, whoever lies beyond.

@@ -189,6 +189,17 @@ struct Renderer::Impl {
     return {camera, all.lowest, all.highest, all.far};
   }
 
+  // Vertices of a tile's border come from its neighbours: they lie within its error.
+  std::uint32_t matter_to(const TileKey& key, const TileFacts& facts) const {
+    if (!effects.gates_tiles()) return std::uint32_t(effects.on().to_ulong());
+    const Extent e = lattice.bounds(key);
+    effects::TileView tile{facts.lowest - facts.error, facts.highest + facts.error};
+    tile.farthest = std::hypot(std::max(camera.eye.x - e.xmin, e.xmax - camera.eye.x),
+                               std::max(camera.eye.y - e.ymin, e.ymax - camera.eye.y),
+                               std::max(camera.eye.z - tile.lowest, tile.highest - camera.eye.z));
+    return std::uint32_t(effects.matter_to(tile).to_ulong());
+  }
+
   FrameStats draw(const Camera& from);
 };
 
@@ -201,14 +212,15 @@ FrameStats Renderer::Impl::draw(const Camera& from) {
   const double curvature = effects.curvature(view);
   const Frustum frustum(camera, curvature, options.far);
   const Selection& selection = supply.update(frustum, stats);
-  make_draws(lattice, selection, supply.cache(), {camera.eye.x, camera.eye.y}, draws);
   const vk::FrameBlock now = make_block(frustum, curvature);
-  stats.tiles_drawn = draws.size();
   std::vector<float> bounds;
   for (const std::uint32_t k : selection.drawn)
     bounds.push_back(float(supply.cache().find(selection.leaves[k].key)->facts.bound));
   for (const float b : bounds) stats.bound_max = std::max(stats.bound_max, double(b));
   const bool other_look = effects.prepare(view, bounds, light_budget(options));
+  make_draws(lattice, selection, supply.cache(), {camera.eye.x, camera.eye.y}, draws,
+             [&](const TileKey& key, const TileFacts& facts) { return matter_to(key, facts); });
+  stats.tiles_drawn = draws.size();
   // With the same input the picture is the one that is there.
   if (!drawn || other_look || stats.tiles_made > 0 || now != block || draws != last_draws) {
     terrain.set(now, draws);

@@ -27,11 +27,15 @@ class SeamMaker {
   SeamMaker(const TileLattice& lattice, const Selection& selection, const TileCache& cache, Point eye)
       : lattice_(lattice), selection_(selection), cache_(cache), eye_(eye) {}
 
-  void make(std::vector<TileDraw>& draws) {
-    holed_.assign(selection_.leaves.size(), false);
+  void make(std::vector<TileDraw>& draws, const TileGate& gate) {
+    holed_.assign(selection_.leaves.size(), false), effects_.assign(selection_.leaves.size(), 0);
     bool any = false;
-    for (const std::uint32_t k : selection_.drawn)
-      any |= holed_[k] = node(selection_.leaves[k].key).facts.holes;
+    for (const std::uint32_t k : selection_.drawn) {
+      const TileKey& key = selection_.leaves[k].key;
+      const TileFacts& facts = node(key).facts;
+      any |= holed_[k] = facts.holes;
+      if (gate) effects_[k] = gate(key, facts);
+    }
     fill(draws);
     if (any && spread_holes(draws)) fill(draws);
   }
@@ -50,7 +54,7 @@ class SeamMaker {
       draw.x = lattice_.first_x(key) - origin[0], draw.y = lattice_.first_y(key) - origin[1];
       draw.stride = 1u << key.level, draw.slot = node(key).slot;
       draw.reducible = float(facts.reducible), draw.holes = holed_[order_[d]],
-      draw.patches = float(facts.patches);
+      draw.patches = float(facts.patches), draw.effects = effects_[order_[d]];
       for (int c = 0; c < 4; ++c)
         draw.corners[std::size_t(c)] = owner(key.level, key.x + (c & 1), key.y + (c >> 1));
       for (int s = 0; s < 4; ++s) make_side(key, s, draw);
@@ -85,6 +89,7 @@ class SeamMaker {
     }
     std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
       if (holed_[a] != holed_[b]) return bool(holed_[b]);
+      if (effects_[a] != effects_[b]) return effects_[a] < effects_[b];
       return distance_[a] != distance_[b] ? distance_[a] < distance_[b] : a < b;
     });
     draw_of_.assign(selection_.leaves.size(), TileDraw::kAlone);
@@ -179,7 +184,8 @@ class SeamMaker {
   Point eye_;
   std::vector<std::uint32_t> order_, draw_of_;  // places of leaves by draw; draws by place
   std::vector<double> distance_;
-  std::vector<bool> holed_;  // leaves that may have a vertex without data
+  std::vector<bool> holed_;             // leaves that may have a vertex without data
+  std::vector<std::uint32_t> effects_;  // of leaves
 };
 
 }  // namespace
@@ -192,8 +198,8 @@ std::array<std::int32_t, 2> half_cell_at(const TileLattice& lattice, Point p) {
 }
 
 void make_draws(const TileLattice& lattice, const Selection& selection, const TileCache& cache, Point eye,
-                std::vector<TileDraw>& draws) {
-  SeamMaker(lattice, selection, cache, eye).make(draws);
+                std::vector<TileDraw>& draws, const TileGate& gate) {
+  SeamMaker(lattice, selection, cache, eye).make(draws, gate);
 }
 
 }  // namespace patchwork

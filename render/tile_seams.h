@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -31,8 +32,8 @@ struct TileDraw {
   std::array<std::uint32_t, 4> beside_near, beside_far;
   float reducible = 0;  ///< metres (TileFacts)
   std::uint32_t holes = 0;
-  float patches = 0;  ///< that the tile was made of
-  std::uint32_t unused = 0;
+  float patches = 0;          ///< that the tile was made of
+  std::uint32_t effects = 0;  ///< what the gate said of it
   bool operator==(const TileDraw&) const = default;
 
   static constexpr std::uint32_t kAlone = 0xffffffffu;
@@ -47,10 +48,13 @@ struct MeshVertex {
   std::int32_t x, y;
 };
 
-/// A draw for each drawn leaf: those without holes, then those that have some or share their vertices,
-/// nearest to the eye first. `draws` is overwritten.
+/// Which effects can matter to a tile, as bits that mean nothing here.
+using TileGate = std::function<std::uint32_t(const TileKey&, const TileFacts&)>;
+
+/// A draw for each drawn leaf: those without holes, then those that have some or share their vertices; of
+/// these, all of the same effects one after the other, nearest to the eye first. `draws` is overwritten.
 void make_draws(const TileLattice& lattice, const Selection& selection, const TileCache& cache, Point eye,
-                std::vector<TileDraw>& draws);
+                std::vector<TileDraw>& draws, const TileGate& gate = {});
 
 /// The half cell at or before a point: what TileDraw::x and y are relative to.
 std::array<std::int32_t, 2> half_cell_at(const TileLattice& lattice, Point p);

@@ -128,8 +128,8 @@ void FrameEffects::draw_legend(Image& picture) const {
   if (!ramps.empty() || !classes.empty()) draw_legends(picture, ramps, classes);
 }
 
-std::vector<std::uint32_t> FrameEffects::constants(bool holes, bool wireframe) const {
-  const auto is = [&](Id id) { return std::uint32_t(has(on_, id)); };
+std::vector<std::uint32_t> FrameEffects::constants(const effects::Set& set, bool holes, bool wireframe) {
+  const auto is = [&](Id id) { return std::uint32_t(has(set, id)); };
   return {holes,
           is(Id::sun),
           is(Id::shadow),

@@ -53,11 +53,21 @@ class FrameEffects {
   void bind(const Bindings& bindings, VkDescriptorSet set, const TileStore& store) const;
   unsigned generation() const { return map_.generation(); }
   /// Specialization constants of effects.glsl behind `holes`.
-  std::vector<std::uint32_t> constants(bool holes, bool wireframe) const;
+  static std::vector<std::uint32_t> constants(const effects::Set& set, bool holes, bool wireframe);
+  /// What of this picture a tile needs.
+  effects::Set matter_to(const effects::TileView& tile) const {
+    return (on_ & ~kGated) | (effects::matter_to(scene_, on_, tile) & kGated);
+  }
+  bool gates_tiles() const { return (on_ & kGated).any(); }  ///< else all tiles need the same
   /// The sky is more than the background.
   bool draws_sky() const { return has(on_, effects::Id::haze) || has(on_, effects::Id::solar_disc); }
 
  private:
+  // Those whose gate at a tile is worth a pipeline of its own; horizons are gated in the map (light.comp).
+  static constexpr effects::Set kGated =
+      effects::Set(1u << unsigned(effects::Id::water) | 1u << unsigned(effects::Id::haze) |
+                   1u << unsigned(effects::Id::contours) | 1u << unsigned(effects::Id::solar_disc));
+
   void put_ramps();
   bool wants_map() const { return scene_.effects.shadow || scene_.effects.sky; }
   ValueScale overlay_of(std::span<const float> bounds) const;

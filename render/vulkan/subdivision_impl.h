@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "render/tile_seams.h"
@@ -20,9 +21,17 @@ struct Subdivided {
   const Device::Impl& device;
   const TileStore& store;
   const Buffer& frame;     ///< terrain.glsl: FrameBlock
-  const OwnedView& draws;  ///< the drawn tiles: those without holes, then those with some
+  const OwnedView& draws;  ///< the drawn tiles, group by group
   std::uint32_t most_tiles;
 };
+
+/// Drawn tiles one after the other that the same pipeline draws.
+struct DrawGroup {
+  std::uint32_t first, count;
+  bool holes;             ///< some may have
+  std::uint32_t effects;  ///< effects::Set
+};
+inline constexpr std::uint32_t kMostGroups = 32;
 
 class Subdivision {
  public:
@@ -33,14 +42,15 @@ class Subdivision {
   virtual VkPrimitiveTopology topology() const = 0;
   virtual const OwnedView& facts() const = 0;
 
-  /// How many tiles are drawn from now on; returns bytes sent. REQUIRES: nothing that uses it still runs.
-  virtual std::size_t set(std::uint32_t solid, std::uint32_t holed) = 0;
+  /// What is drawn from now on: groups that follow each other, kMostGroups at most; returns bytes sent.
+  /// REQUIRES: nothing that uses it still runs.
+  virtual std::size_t set(std::span<const DrawGroup> groups) = 0;
   /// Outside of a render pass, with tiles to draw: how each block is divided.
   virtual void record(VkCommandBuffer commands) const = 0;
   virtual std::size_t dispatches() const = 0;  ///< of record
-  /// Inside of one, with the pipeline for tiles with or without holes: one indirect call.
-  virtual void draw(VkCommandBuffer commands, bool holes) const = 0;
-  virtual std::uint32_t draws() const = 0;  ///< of both calls
+  /// Inside of one, with the pipeline of a group: one indirect call.
+  virtual void draw(VkCommandBuffer commands, std::size_t group) const = 0;
+  virtual std::uint32_t draws() const = 0;  ///< of all calls
 
   /// Three vertices for each triangle that was recorded last, if it makes a mesh. Waits for the card.
   virtual std::vector<MeshVertex> read_mesh(Commands&) const { return {}; }

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cassert>
 #include <cstring>
 
@@ -25,8 +24,8 @@ constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_ST
                                        VK_SHADER_STAGE_FRAGMENT_BIT;
 
 OwnedPipeline terrain_pipeline(const Bindings& bindings, VkRenderPass pass, const Subdivision& subdivision,
-                               const FrameEffects& effects, bool holes, bool edges) {
-  const std::vector<std::uint32_t> constants = effects.constants(holes, edges);
+                               const effects::Set& effects, bool holes, bool edges) {
+  const std::vector<std::uint32_t> constants = FrameEffects::constants(effects, holes, edges);
   std::vector<GraphicsState::Stage> stages = subdivision.stages();
   stages.push_back({VK_SHADER_STAGE_FRAGMENT_BIT, shaders::terrain_frag()});
   return make_graphics(bindings, pass,
@@ -36,8 +35,8 @@ OwnedPipeline terrain_pipeline(const Bindings& bindings, VkRenderPass pass, cons
                         .lines = edges});
 }
 
-OwnedPipeline sky_pipeline(const Bindings& bindings, VkRenderPass pass, const FrameEffects& effects) {
-  const std::vector<std::uint32_t> constants = effects.constants(false, false);
+OwnedPipeline sky_pipeline(const Bindings& bindings, VkRenderPass pass, const effects::Set& effects) {
+  const std::vector<std::uint32_t> constants = FrameEffects::constants(effects, false, false);
   return make_graphics(bindings, pass,
                        {.stages = {{VK_SHADER_STAGE_VERTEX_BIT, shaders::sky_vert()},
                                    {VK_SHADER_STAGE_FRAGMENT_BIT, shaders::sky_frag()}},
@@ -69,51 +68,59 @@ void TerrainPass::set(const FrameBlock& frame, std::span<const TileDraw> draws) 
   assert(draws.size_bytes() <= draws_.bytes());
   std::memcpy(frame_.mapped(), &frame, sizeof frame);
   if (!draws.empty()) std::memcpy(draws_.mapped(), draws.data(), draws.size_bytes());
-  const auto first_holed =
-      std::find_if(draws.begin(), draws.end(), [](const TileDraw& d) { return d.holes; });
-  solid_ = std::uint32_t(first_holed - draws.begin()), holed_ = std::uint32_t(draws.end() - first_holed);
-  bytes_set_ = sizeof frame + draws.size_bytes() + subdivision_->set(solid_, holed_);
+  groups_.clear();
+  for (std::uint32_t d = 0; d < draws.size(); ++d) {
+    const bool holes = draws[d].holes;
+    const std::uint32_t effects = draws[d].effects;
+    const bool same = !groups_.empty() && groups_.back().holes == holes && groups_.back().effects == effects;
+    if (!same && groups_.size() < kMostGroups) groups_.push_back({d, 0, holes, effects});
+    DrawGroup& last = groups_.back();
+    ++last.count, last.holes |= holes, last.effects |= effects;
+  }
+  bytes_set_ = sizeof frame + draws.size_bytes() + subdivision_->set(groups_);
 }
 
 std::size_t TerrainPass::record_subdivision(VkCommandBuffer commands) const {
-  if (solid_ + holed_ == 0) return 0;
+  if (groups_.empty()) return 0;
   subdivision_->record(commands);
   return subdivision_->dispatches();
 }
 
-TerrainPass::Pipelines TerrainPass::make_pipelines(const FrameEffects& effects) const {
-  Pipelines p;
-  const bool edges = has(effects.on(), effects::Id::wireframe);
-  for (const bool holes : {false, true}) {
-    p.ground[holes] = terrain_pipeline(bindings_, pass_, *subdivision_, effects, holes, false);
-    if (edges) p.edges[holes] = terrain_pipeline(bindings_, pass_, *subdivision_, effects, holes, true);
-  }
-  if (effects.draws_sky()) p.sky = sky_pipeline(bindings_, pass_, effects);
+TerrainPass::Pipelines& TerrainPass::with_pipelines(const FrameEffects& effects, const effects::Set& set,
+                                                    bool holes) {
+  Pipelines& p = pipelines_[set.to_ulong()];
+  if (!p.ground[holes])
+    p.ground[holes] = terrain_pipeline(bindings_, pass_, *subdivision_, set, holes, false);
+  if (has(effects.on(), effects::Id::wireframe) && !p.edges[holes])
+    p.edges[holes] = terrain_pipeline(bindings_, pass_, *subdivision_, set, holes, true);
   return p;
 }
 
 void TerrainPass::use(const FrameEffects& effects) {
   if (generation_ != effects.generation()) effects.bind(bindings_, set_, store_);
   generation_ = effects.generation();
-  const auto [at, fresh] = pipelines_.try_emplace(effects.on().to_ulong());
-  if (fresh) at->second = make_pipelines(effects);
-  used_ = &at->second;
+  used_.clear();
+  for (const DrawGroup& g : groups_)
+    used_.push_back(&with_pipelines(effects, effects::Set(g.effects), g.holes));
+  sky_ = nullptr;
+  if (!effects.draws_sky()) return;
+  Pipelines& p = pipelines_[effects.on().to_ulong()];
+  if (!p.sky) p.sky = sky_pipeline(bindings_, pass_, effects.on());
+  sky_ = &p;
 }
 
 void TerrainPass::record_draws(VkCommandBuffer commands) const {
   vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, bindings_.layout(), 0, 1, &set_, 0,
                           nullptr);
-  const auto draw = [&](const std::array<OwnedPipeline, 2>& pipelines) {
-    for (const bool holes : {false, true}) {
-      if ((holes ? holed_ : solid_) == 0) continue;
-      vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipelines[holes].get());
-      subdivision_->draw(commands, holes);
+  for (const auto kind : {&Pipelines::ground, &Pipelines::edges})
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const OwnedPipeline& pipeline = (used_[g]->*kind)[groups_[g].holes];
+      if (!pipeline) continue;
+      vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline.get());
+      subdivision_->draw(commands, g);
     }
-  };
-  draw(used_->ground);
-  if (used_->edges[0]) draw(used_->edges);
-  if (!used_->sky) return;
-  vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, used_->sky.get());
+  if (!sky_) return;
+  vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, sky_->sky.get());
   vkCmdDraw(commands, 3, 1, 0, 0);
 }
 

@@ -1,11 +1,12 @@
-// Draws tiles: dispatches say how each block is divided, one indirect call draws all of them (another one
-// those with holes), and what is left of the picture is sky.
+// Draws tiles: dispatches say how each block is divided, one indirect call draws all that need the same
+// (those with holes, those that an effect cannot matter to), and what is left of the picture is sky.
 #pragma once
 
 #include <array>
 #include <map>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "blend/vulkan/pipeline_impl.h"
 #include "render/tile_seams.h"
@@ -28,7 +29,7 @@ class TerrainPass {
   TerrainPass(const Device::Impl& device, const TileStore& store, VkRenderPass pass,
               std::uint32_t most_tiles);
 
-  /// What is drawn from now on. REQUIRES: those with holes come last; nothing that uses it still runs.
+  /// What is drawn from now on. REQUIRES: in the order of make_draws; nothing that uses it still runs.
   void set(const FrameBlock& frame, std::span<const TileDraw> draws);
   /// Outside of a render pass: how what was set is divided. Returns how many dispatches that takes.
   std::size_t record_subdivision(VkCommandBuffer commands) const;
@@ -42,24 +43,25 @@ class TerrainPass {
   const Subdivision& subdivision() const { return *subdivision_; }
 
  private:
-  // Of one set of effects; what it does not need is none.
+  // Of one set of effects; what was not needed yet is none.
   struct Pipelines {
     std::array<OwnedPipeline, 2> ground, edges;  // without and with holes
     OwnedPipeline sky;
   };
-  Pipelines make_pipelines(const FrameEffects& effects) const;
+  Pipelines& with_pipelines(const FrameEffects& effects, const effects::Set& set, bool holes);
   const TileStore& store_;
   VkRenderPass pass_;
   Bindings bindings_;
   std::map<unsigned long, Pipelines> pipelines_;  // by the set of effects
-  const Pipelines* used_ = nullptr;
+  std::vector<const Pipelines*> used_;            // by each group
+  const Pipelines* sky_ = nullptr;
   unsigned generation_ = 0;
   VkDescriptorSet set_ = VK_NULL_HANDLE;
   OwnedSets sets_;
   Buffer frame_, draws_;
   OwnedView draw_texels_;
   std::unique_ptr<Subdivision> subdivision_;
-  std::uint32_t solid_ = 0, holed_ = 0;
+  std::vector<DrawGroup> groups_;
   std::size_t bytes_set_ = 0;
 };
 

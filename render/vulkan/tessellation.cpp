@@ -47,8 +47,8 @@ class Tessellation : public Subdivision {
   VkPrimitiveTopology topology() const override { return VK_PRIMITIVE_TOPOLOGY_PATCH_LIST; }
   const OwnedView& facts() const override { return edge_texels_; }
 
-  std::size_t set(std::uint32_t solid, std::uint32_t holed) override {
-    solid_ = solid, holed_ = holed;
+  std::size_t set(std::span<const DrawGroup> groups) override {
+    groups_.assign(groups.begin(), groups.end());
     return 0;
   }
   void record(VkCommandBuffer commands) const override {
@@ -63,11 +63,14 @@ class Tessellation : public Subdivision {
     run(edges_pipeline_, edge_set_);
   }
   std::size_t dispatches() const override { return 2; }
-  void draw(VkCommandBuffer commands, bool holes) const override {
-    vkCmdDrawIndirect(commands, calls_.get(), (holes ? solid_ : 0) * sizeof(VkDrawIndirectCommand),
-                      holes ? holed_ : solid_, sizeof(VkDrawIndirectCommand));
+  void draw(VkCommandBuffer commands, std::size_t group) const override {
+    const DrawGroup& g = groups_[group];
+    vkCmdDrawIndirect(commands, calls_.get(), g.first * sizeof(VkDrawIndirectCommand), g.count,
+                      sizeof(VkDrawIndirectCommand));
   }
-  std::uint32_t draws() const override { return solid_ + holed_; }
+  std::uint32_t draws() const override {
+    return groups_.empty() ? 0 : groups_.back().first + groups_.back().count;
+  }
 
  private:
   Bindings bindings_;
@@ -76,7 +79,7 @@ class Tessellation : public Subdivision {
   OwnedSets factor_sets_, edge_sets_;
   Buffer factors_, edges_, calls_;
   OwnedView factor_texels_, edge_texels_;
-  std::uint32_t solid_ = 0, holed_ = 0;
+  std::vector<DrawGroup> groups_;
 };
 
 }  // namespace

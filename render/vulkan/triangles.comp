@@ -1,6 +1,6 @@
 #version 450
-// The triangles of each block, as names of vertices, one draw after the other: those without holes from the
-// beginning, those with holes behind the most that the others may have. Counterclockwise from above.
+// The triangles of each block, as names of vertices, one draw after the other, and which of them each group of draws
+// has. Counterclockwise from above.
 #extension GL_GOOGLE_include_directive : require
 #include "mesh.glsl"
 
@@ -10,12 +10,13 @@ layout(binding = 5) uniform usamplerBuffer needs;
 layout(binding = 7) uniform usamplerBuffer edges;   // mesh_edges.comp
 layout(binding = 9) uniform usamplerBuffer counts;
 layout(binding = 10) writeonly buffer Indices { uint indices[]; };
-layout(binding = 11) buffer Calls { uint calls[]; };  // VkDrawIndexedIndirectCommand, without and with holes
-layout(push_constant) uniform Push { uint solid, most; } push;  // draws without holes; triangles of a draw
+layout(binding = 11) writeonly buffer Calls { uint calls[]; };  // VkDrawIndexedIndirectCommand of each group
+layout(binding = 12) readonly buffer Firsts { uvec2 firsts[]; };  // of each group: its first draw, the one behind it
+layout(push_constant) uniform Push { uint groups; } push;
 
 const int kSide = 2 * kBlockCells;
 
-shared uint parts[64], draws_before;
+shared uint parts[64], sum;
 
 int first_draw;   // the draw, and where its block begins
 ivec2 origin;
@@ -137,25 +138,35 @@ void put_block(Mesh mesh, uvec2 split) {
   put_along(mesh.inside, mesh.edges, split);
 }
 
-void main() {
-  const int d = int(gl_WorkGroupID.x), b = int(gl_LocalInvocationID.x), solid = int(push.solid);
-  const Mesh mesh = unpacked(texelFetch(needs, d * 64 + b));
-  const uvec4 edge = texelFetch(edges, d * 64 + b);
-  const bool holes = d >= solid;
+// Triangles of draws [from, to), for all of the workgroup. Called by all of it.
+uint triangles_of(int from, int to) {
+  const int b = int(gl_LocalInvocationID.x);
   uint part = 0;
-  for (int k = (holes ? solid : 0) + b; k < d; k += 64) part += texelFetch(counts, k).x;
+  for (int k = from + b; k < to; k += 64) part += texelFetch(counts, k).x;
+  barrier();
   parts[b] = part;
   barrier();
   for (int k = 1; b < 8 && k < 8; ++k) part += parts[8 * k + b];
   if (b < 8) parts[b] = part;
   barrier();
   for (int k = 1; b == 0 && k < 8; ++k) part += parts[k];
-  if (b == 0) draws_before = part;
+  if (b == 0) sum = part;
   barrier();
-  const uint before = draws_before + edge.w;
-  if (b == 63 && (d == solid - 1 || d == int(gl_NumWorkGroups.x) - 1)) calls[holes ? 5 : 0] = 3 * (before + edge.z);
+  return sum;
+}
+
+void main() {
+  const int d = int(gl_WorkGroupID.x), b = int(gl_LocalInvocationID.x);
+  const Mesh mesh = unpacked(texelFetch(needs, d * 64 + b));
+  const uvec4 edge = texelFetch(edges, d * 64 + b);
+  const uint draws_before = triangles_of(0, d);
+  for (uint g = 0; g < push.groups; ++g) {
+    if (firsts[g].x != uint(d)) continue;
+    const uint all = triangles_of(d, int(firsts[g].y));
+    if (b == 0) calls[5 * g] = 3 * all, calls[5 * g + 2] = 3 * draws_before;
+  }
   if (!mesh.seen) return;
   first_draw = d, origin = ivec2(b % kBlocks, b / kBlocks) * kSide;
-  place = 3 * (before + (holes ? push.solid * push.most : 0));
+  place = 3 * (draws_before + edge.w);
   put_block(mesh, edge.xy);
 }

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <set>
 
 #include "render/effects/relief.h"
 #include "render/renderer.h"
+#include "render/tile_seams.h"
 #include "tests/blend/vulkan_scene.h"
 #include "tests/render/shade_reference.h"
 
@@ -251,6 +253,51 @@ TEST_F(CountersTest, EachChangeMakesAnewWhatRestsOnIt) {
   EXPECT_TRUE(r.refresh(db));
   EXPECT_EQ(row(moved), (Row{1, 1, 1, 1})) << "insertion";
   EXPECT_EQ(row(moved), (Row{0, 0, 0, 0})) << "nothing";
+}
+
+// Tiles of the same effects are drawn together: only those that reach below the level are wet.
+TEST_F(CountersTest, ATileIsShadedByWhatCanMatterToIt) {
+  const Database db = folder_.database();
+  for (const Tessellation way : {Tessellation::hardware, Tessellation::mesh}) {
+    SceneEffects e = lit(120, 12);
+    const auto renderer = [&] {
+      return Renderer(test_device(), db,
+                      {.width = kWidth,
+                       .height = kHeight,
+                       .memory = std::size_t{256} << 20,
+                       .tessellation = way,
+                       .effects = e,
+                       .legend = false});
+    };
+    const auto wet = [&](const Renderer& r) {
+      std::size_t n = 0;
+      for (const TileDraw& d : r.drawn().draws) n += has(effects::Set(d.effects), Id::water);
+      return n;
+    };
+    Renderer dry = renderer();
+    const FrameStats plain = dry.draw(kCamera);
+    EXPECT_EQ(wet(dry), 0u);
+    const GridInfo& land = db.grids()[0].info;
+    std::size_t before = 0;
+    for (const double share : {0.01, 0.3, 1.0}) {
+      e.water = effects::Water{.level = land.lowest + share * (land.highest - land.lowest)};
+      Renderer r = renderer();
+      const FrameStats stats = r.draw(kCamera);
+      EXPECT_EQ(stats.triangles, plain.triangles) << "each tile is drawn once";
+      EXPECT_GE(wet(r), before);
+      if (share < 1) {
+        EXPECT_LT(wet(r), stats.tiles_drawn);
+      }
+      if (way == Tessellation::mesh) {
+        std::set<std::pair<std::uint32_t, std::uint32_t>> alike;
+        for (const TileDraw& d : r.drawn().draws) alike.emplace(d.holes, d.effects);
+        EXPECT_EQ(stats.draws, alike.size()) << share;
+        EXPECT_LE(alike.size(), share < 1 ? 4u : 2u) << "with and without holes";
+      }
+      before = wet(r);
+    }
+    EXPECT_EQ(before, plain.tiles_drawn) << "all of it may be under water";
+  }
 }
 
 // Light comes in slices while a camera flies: a bounded part a frame, full light until then.

@@ -20,11 +20,12 @@ float up(double v) {
   return double(f) < v ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
 }
 
-// The largest code that an interpolant takes over cells [i0, i1) x [j0, j1) (window): the largest sample and,
+// The largest code (the least one, negative, where `sign` is -1) that an interpolant takes over cells
+// [i0, i1) x [j0, j1) (window): the largest sample and,
 // where it is not linear, an eighth of the largest second differences it reads; those across rows once more
 // by what the rows' own weights add up to (db/basis.h).
-double most_of(const float* codes, int i0, int j0, int i1, int j1, int smoothness) {
-  const auto at = [&](int i, int j) { return double(codes[j * kSide + i]); };
+double most_of(const float* codes, double sign, int i0, int j0, int i1, int j1, int smoothness) {
+  const auto at = [&](int i, int j) { return sign * double(codes[j * kSide + i]); };
   double most = -INFINITY, along = 0, across = 0;
   for (int j = j0; j <= j1; ++j)
     for (int i = i0; i <= i1; ++i) most = std::max(most, at(i, j));
@@ -60,7 +61,9 @@ HeightTree::HeightTree(const Database& db, const std::vector<Blend::Placed>& pla
         const int i0 = 1 + i * kCells, j0 = 1 + j * kCells;
         const int i1 = std::min(i0 + kCells, kSide - 2), j1 = std::min(j0 + kCells, kSide - 2);
         const bool apart = i0 > p.domain.i1 || j0 > p.domain.j1;
-        const double code = apart ? -INFINITY : most_of(surface->codes.data(), i0, j0, i1, j1, smoothness);
+        const double sign = p.quantum < 0 ? -1 : 1;  // depths: the least of them is the highest place
+        const double code =
+            apart ? -INFINITY : sign * most_of(surface->codes.data(), sign, i0, j0, i1, j1, smoothness);
         float& h = blocks[std::size_t(j * kBlocks + i)];
         h = apart ? kNothing : up(p.quantum * (p.origin + code) + p.base);
         // The evaluator rounds elsewhere: a hair more.

@@ -14,9 +14,11 @@ namespace patchwork {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kWave = 2048;  // rays that are evaluated together
-constexpr double kAlong = 1e-3;      // metres along a ray: how exactly a hit is found
-constexpr double kTouching = 1e-6;   // metres: a ray's own ends may lie on the surface
+// Rays that are evaluated together: so many, and about so many places at them (200 MB).
+constexpr std::size_t kWave = 2048;
+constexpr double kWavePlaces = 2e6, kPlacesACell = 6;
+constexpr double kAlong = 1e-3;     // metres along a ray: how exactly a hit is found
+constexpr double kTouching = 1e-6;  // metres: a ray's own ends may lie on the surface
 constexpr double kMiss = SightLines::kClearance / 8;
 constexpr int kRounds = 12;  // of looking for humps, at most: each halves the steps where one may be
 
@@ -162,8 +164,13 @@ const Blend& SightLines::surface() const { return impl_->blend; }
 std::vector<Sight> SightLines::find(std::span<const SightRay> rays, const Air& air) const {
   const SightPlanner& planner = impl_->planner;
   std::vector<Sight> sights(rays.size());
-  for (std::size_t from = 0; from < rays.size(); from += kWave) {
-    const std::size_t n = std::min(kWave, rays.size() - from);
+  std::size_t n = 0;
+  for (std::size_t from = 0; from < rays.size(); from += n) {
+    double places = 0;
+    for (n = 0; from + n < rays.size() && n < kWave && (n == 0 || places < kWavePlaces); ++n) {
+      const SightRay& r = rays[from + n];
+      places += kPlacesACell * (1 + std::hypot(r.to.x - r.from.x, r.to.y - r.from.y) / planner.finest_cell());
+    }
     Wave wave(impl_->blend, rays.subspan(from, n), air);
     // How near the surface comes to the ray at three likely places: what is farther below need not be looked
     // at.

@@ -50,7 +50,10 @@ SightPlanner::SightPlanner(const Database& db, std::span<const PatchId> patches,
     : options_(options),
       placed_(place_all(db, patches, options.smoothness)),
       heights_(db, placed_, options.smoothness) {
-  for (const Blend::Placed& p : placed_) largest_bound_ = std::max(largest_bound_, p.error + p.rim);
+  for (const Blend::Placed& p : placed_) {
+    largest_bound_ = std::max(largest_bound_, p.error + p.rim);
+    finest_cell_ = std::min(finest_cell_, 1 / std::sqrt(std::abs(p.ua * p.vb - p.ub * p.va)));
+  }
 }
 
 // Blocks over which the ray is less than `threshold` (which may fall meanwhile) above the largest height:
@@ -130,6 +133,50 @@ void SightPlanner::add_between(const std::vector<Part>& active, double low, doub
     plan.add(low + (high - low) * b / (points + 1), exact ? SightPlace::parabola : SightPlace::curve);
 }
 
+// What lies too far below to come near the ray still answers, and takes its weight from what does come near:
+// the patches whose domains the ray crosses within `parts`, and where they begin to speak, change what they
+// say in company of others, and end.
+std::vector<SightPlanner::Part> SightPlanner::speakers(const SightPath& path, const std::vector<Part>& parts,
+                                                       std::vector<double>& t) const {
+  std::vector<SightInterval> near;  // apart, ascending
+  for (const Part& p : parts) {
+    if (near.empty() || p.over.low > near.back().high) near.push_back(p.over);
+    near.back().high = std::max(near.back().high, p.over.high);
+  }
+  std::vector<Part> all;
+  const auto each_overlap = [&](const SightInterval& over, auto take) {
+    const auto from = std::partition_point(near.begin(), near.end(),
+                                           [&](const SightInterval& n) { return n.high < over.low; });
+    for (auto n = from; n != near.end() && n->low <= over.high; ++n)
+      take(SightInterval{std::max(n->low, over.low), std::min(n->high, over.high)});
+  };
+  heights_.visit(
+      [&](const Extent& e, double) {
+        SightInterval over;
+        over.clip(path.x0, path.dx, e.xmin, e.xmax);
+        over.clip(path.y0, path.dy, e.ymin, e.ymax);
+        bool meets = false;
+        if (!over.empty()) each_overlap(over, [&](const SightInterval&) { meets = true; });
+        return meets;
+      },
+      [&](std::size_t k) {
+        const Projected on(placed_[k], path);
+        const SightInterval domain = on.within(placed_[k].domain), kernel = on.within(placed_[k].kernel);
+        if (domain.empty()) return;
+        const auto add = [&](const SightInterval& over) {
+          if (!over.empty()) add_lines(on, {k, over, 0, kernel}, t);
+        };
+        each_overlap(domain, [&](const SightInterval& over) {
+          all.push_back({k, over, 0, kernel});
+          if (kernel.empty() || placed_[k].ragged || options_.composition != Composition::priority)
+            return add(over);
+          add({over.low, std::min(over.high, kernel.low)}), add({std::max(over.low, kernel.high), over.high});
+        });
+      });
+  std::sort(all.begin(), all.end(), [](const Part& a, const Part& b) { return a.over.low < b.over.low; });
+  return all;
+}
+
 SightPlanner::Plan SightPlanner::plan(const SightPath& path, double threshold) const {
   std::vector<Part> parts, active;
   std::vector<double> t;
@@ -138,21 +185,22 @@ SightPlanner::Plan SightPlanner::plan(const SightPath& path, double threshold) c
     add_lines(on, part, t);
   });
   std::sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.over.low < b.over.low; });
+  const std::vector<Part> speaking = speakers(path, parts, t);
   std::sort(t.begin(), t.end());
   t.erase(std::unique(t.begin(), t.end(), [](double a, double b) { return b - a < kSameParameter; }),
           t.end());
   Plan plan;
-  std::size_t part = 0;
+  std::size_t part = 0, speaker = 0;
   double reach = -1;  // up to here the parts so far go without a gap
   for (std::size_t k = 0; k < t.size(); ++k) {
     const bool joined = k > 0 && t[k] <= reach + kSameParameter;
     if (joined) add_between(active, t[k - 1], t[k], plan);
     plan.add(t[k], joined ? SightPlace::line : SightPlace::begins);
     std::erase_if(active, [&](const Part& p) { return p.over.high <= t[k]; });
-    for (; part < parts.size() && parts[part].over.low <= t[k] + kSameParameter; ++part) {
-      active.push_back(parts[part]);
+    for (; part < parts.size() && parts[part].over.low <= t[k] + kSameParameter; ++part)
       reach = std::max(reach, parts[part].over.high);
-    }
+    for (; speaker < speaking.size() && speaking[speaker].over.low <= t[k] + kSameParameter; ++speaker)
+      active.push_back(speaking[speaker]);
   }
   return plan;
 }

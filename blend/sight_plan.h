@@ -2,6 +2,7 @@
 // (used by sight.cpp).
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -29,19 +30,22 @@ class SightPlanner {
   double likely(const SightPath& path) const;
 
   double largest_bound() const { return largest_bound_; }  ///< metres
+  double finest_cell() const { return finest_cell_; }      ///< metres along a side of the smallest cells
 
  private:
   struct Part;
   struct Projected;
   template <class Take>
   void visit_parts(const SightPath& path, const double& threshold, Take take) const;
+  std::vector<Part> speakers(const SightPath& path, const std::vector<Part>& parts,
+                             std::vector<double>& t) const;
   void add_lines(const Projected& on, const Part& part, std::vector<double>& t) const;
   void add_between(const std::vector<Part>& active, double low, double high, Plan& plan) const;
 
   BlendOptions options_;
   std::vector<Blend::Placed> placed_;
   HeightTree heights_;
-  double largest_bound_ = 0;
+  double largest_bound_ = 0, finest_cell_ = INFINITY;
 };
 
 }  // namespace patchwork

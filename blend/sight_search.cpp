@@ -63,15 +63,20 @@ void HitSearch::take(double t, double above, double bound) {
 void find_humps(const std::vector<SightSample>& s, double miss,
                 const std::function<void(double t, SightPlace)>& take) {
   double most = -INFINITY, hit = INFINITY;
+  bool may = false, must = false;  // hide the ray, for what is known so far
   for (const SightSample& a : s) {
     if (a.above > most) most = a.above;
     if (a.above > miss) hit = std::min(hit, a.t);
+    may |= a.above + a.bound > miss, must |= a.above - a.bound > miss;
   }
   for (std::size_t k = 1; k + 1 < s.size(); ++k) {
     const SightSample &a = s[k - 1], &b = s[k], &c = s[k + 1];
     if (b.place <= SightPlace::line) continue;
     const Parabola p(a, b, c);
-    const double enough = a.t < hit ? std::min(most, 0.0) + miss : most + miss;
+    double enough = a.t < hit ? std::min(most, 0.0) + miss : most + miss;
+    // Where bounds differ, a lower hump may be what decides.
+    if (!may) enough = std::min(enough, miss - std::max({a.bound, b.bound, c.bound}));
+    if (!must) enough = std::min(enough, miss + std::min({a.bound, b.bound, c.bound}));
     const double seen = std::max({a.above, b.above, c.above}), half = 0.5 * (c.t - a.t);
     const bool peaks = p.bend < 0 && p.peak() > a.t && p.peak() < c.t && p.peak() != b.t;
     if (b.place == SightPlace::parabola) {

@@ -42,8 +42,9 @@ class HitSearch {
 };
 
 /// Where to look next, so that the surface is nowhere higher than what was seen by more than `miss` (metres),
-/// and does not rise above the ray by more than that before it was seen to: peaks of parabolas through three
-/// neighbouring samples and, where the surface is none, the middles between them.
+/// does not rise above the ray by more than that before it was seen to, and is within its bounds of the ray
+/// nowhere that was not seen, where that decides: peaks of parabolas through three neighbouring samples and,
+/// where the surface is none, the middles between them.
 void find_humps(const std::vector<SightSample>& samples, double miss,
                 const std::function<void(double t, SightPlace)>& take);
 

@@ -30,7 +30,7 @@ struct ImportOptions {
   bool dry_run = false;                 ///< all of it, then nothing is kept
   double tolerance = 0;      ///< metres by which a stored sample may differ from the file's; enters the bound
   std::string replace = {};  ///< a grid that goes out in the same transaction; may have the new one's name
-  Progress progress = {};    ///< share done, 0 once nobody else can write; may be empty
+  Progress progress = {};    ///< share done, 0 once nobody else can write, 1 when all but the commit is done
 };
 
 struct ImportReport {

@@ -354,6 +354,7 @@ ImportReport Database::import(const RasterSource& source, const ImportOptions& o
                     "give another with --name, or take its place with --replace " + options.name);
     report = Importer(*impl_, source, options).run();
     committing = now();
+    if (options.progress) options.progress(1);
     return !options.dry_run && report.duplicate_of.empty();
   });
   report.seconds.store += now() - committing;

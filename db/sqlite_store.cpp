@@ -148,7 +148,8 @@ class SqliteStore : public Store {
   std::uint64_t file_bytes() const override;
   bool made_file() const override { return made_; }
   void remove_file() override {
-    for (const char* end : {"", "-wal", "-shm"}) std::filesystem::remove(path_ + end);
+    // The file goes last: who finds one finds no log of another.
+    for (const char* end : {"-wal", "-shm", ""}) std::filesystem::remove(path_ + end);
   }
 
  private:

@@ -160,6 +160,7 @@ Update::Source get_source(Reader& r) {
   if (width < 2 || height < 2) refuse("a grid of it has no cells");
   s.shape = GridShape(int(width), int(height), area != 0);
   s.quantum = r.metres(), s.base = r.metres(), s.rim_error = r.error();
+  if (s.quantum == 0) refuse("a grid of it has no unit");
   s.code_origin = r.get<std::int64_t>();
   return s;
 }
@@ -181,9 +182,9 @@ Update::Patch get_patch(Reader& r, const std::vector<Update::Source>& sources) {
   s.id.value = r.get<std::uint64_t>(), s.level = s.id.level();
   for (double& e : p.error) e = r.error();
   p.bottom = r.error();
-  const auto of = std::find_if(sources.begin(), sources.end(),
-                               [&](const Update::Source& g) { return g.id == s.id.grid(); });
-  if (of == sources.end()) refuse("a patch of it belongs to no grid");
+  const auto of = std::lower_bound(sources.begin(), sources.end(), s.id.grid(),
+                                   [](const Update::Source& g, GridId id) { return g.id < id; });
+  if (of == sources.end() || of->id != s.id.grid()) refuse("a patch of it belongs to no grid");
   if (s.level >= of->shape.levels() || s.id.bx() >= of->shape.blocks_i(s.level) ||
       s.id.by() >= of->shape.blocks_j(s.level))
     refuse("a patch of it lies in no block of its grid");
@@ -271,7 +272,11 @@ Update decode_update(std::span<const std::byte> bytes) {
   if (!structure) refuse("its structure cannot be read");
   Reader r(*structure);
   Update u;
-  for (std::uint32_t n = r.at_most(0xffff); n > 0; --n) u.sources.push_back(get_source(r));
+  for (std::uint32_t n = r.at_most(0xffff); n > 0; --n) {
+    u.sources.push_back(get_source(r));
+    const std::size_t k = u.sources.size();
+    if (k > 1 && !(u.sources[k - 2].id < u.sources[k - 1].id)) refuse("its grids are not in order");
+  }
   std::vector<Expected> sheets;
   const auto most = std::uint32_t(std::min<std::size_t>(bytes.size() / kLeastBytes, UINT32_MAX));
   for (std::uint32_t n = r.at_most(2 * kSide); n > 0; --n) sheets.push_back(get_sheet(r, u, most));

@@ -42,6 +42,7 @@ class Resampler {
   Resampler(const Evaluator& blend, const Raster& raster, std::vector<std::string> bands, std::size_t memory,
             const std::function<void(double)>& progress = {});
   void rows(int factor, int row, int rows, std::span<float* const> bands);
+  bool whole() const { return !whole_.empty(); }  ///< all at once
   const ResampleTally& tally() const { return tally_; }
 
  private:

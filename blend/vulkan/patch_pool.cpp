@@ -33,7 +33,7 @@ double steepest(const PatchSurface& s, const Blend::Placed& p) {
       if (i > i0) most = std::max(most, std::abs(code(i, j) - code(i - 1, j)));
       if (j > j0) most = std::max(most, std::abs(code(i, j) - code(i, j - 1)));
     }
-  return double(most) * p.quantum;
+  return double(most) * std::abs(p.quantum);
 }
 
 PatchRecord32 record32(const Blend::Placed& p, const PatchPool::Resident& r) {

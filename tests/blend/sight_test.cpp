@@ -185,6 +185,7 @@ std::uint32_t naive_steps(const Blend& surface, const SightRay& r, const March& 
 
 TEST_F(GrazingRays, MissNothingThatDenseMarchingSees) {
   std::size_t blocked = 0, open = 0, missed_by_steps = 0, searched = 0, unguarded = 0, unguarded_beyond = 0;
+  std::size_t undecided = 0;
   double worst = 0;
   const std::uint64_t seed = test_seed(11);
   std::vector<BlendOptions> blends = all_blends();
@@ -210,6 +211,14 @@ TEST_F(GrazingRays, MissNothingThatDenseMarchingSees) {
           worst = std::max(worst, most + s.clearance);
           ASSERT_LE(most, -s.clearance + SightLines::kClearance) << which;
           ASSERT_EQ(s.blocked, s.clearance < -1e-6) << which;
+          double may = -INFINITY, must = -INFINITY;
+          for (std::size_t p = 0; p < m.above.size(); ++p)
+            if (!std::isnan(m.above[p]))
+              may = std::max(may, m.above[p] + m.bound[p]), must = std::max(must, m.above[p] - m.bound[p]);
+          ASSERT_FALSE(s.verdict == Verdict::visible && may > SightLines::kClearance) << which << ": " << may;
+          ASSERT_FALSE(s.verdict != Verdict::hidden && must > SightLines::kClearance)
+              << which << ": " << must;
+          undecided += s.verdict == Verdict::undecided;
           missed_by_steps += s.blocked && m.most(15) <= 0;
           (s.blocked ? blocked : open) += 1;
           if (!s.blocked) continue;
@@ -227,6 +236,7 @@ TEST_F(GrazingRays, MissNothingThatDenseMarchingSees) {
               std::max(worst, 0.0), SightLines::kClearance, "m");
   EXPECT_GT(std::min(blocked, open), trials() / 10);
   EXPECT_GT(searched, trials() / 20);
+  EXPECT_GT(undecided, trials() / 50);
   std::printf("unguarded interpolation exceeds the cap for %zu of %zu\n", unguarded_beyond, unguarded);
   EXPECT_GT(unguarded_beyond, 0u) << "negative control: a search without a guard";
   EXPECT_GT(missed_by_steps, 0u) << "negative control: steps of 3 m miss ridges";
@@ -254,6 +264,48 @@ TEST_F(GrazingRays, HitWhereTheSurfaceFirstRisesAboveThem) {
     EXPECT_GE(height_at(lines.surface(), {s.hit.x, s.hit.y}), s.hit.z) << "ray " << k;
   }
   EXPECT_GT(hits, 50u);
+}
+
+// A pit far below a ray, surveyed finely, in a plain of large cells: the plain is not one parabola across it.
+TEST(GrazingRaysOverAPit, AreHiddenByThePlainBeforeIt) {
+  const Land land(
+      {of_terrain({.width = 65, .height = 65, .geotransform = {-45, 90, 0, 5805, 0, -90}, .accuracy = 1},
+                  [](double x, double) { return 0.1 * x; }),
+       of_terrain({.width = 300, .height = 300, .geotransform = {1899, 2, 0, 3201, 0, -2}, .accuracy = 0.1},
+                  [](double, double) { return -40.0; })});
+  const SightLines lines(land.db(), extract(land.db(), {.error = 0}).patches, {});
+  const SightRay ray{{1810, 2900, 182.7}, {2300, 2900, 207.2}};
+  const Sight s = lines.find({&ray, 1}, kFlat)[0];
+  EXPECT_TRUE(s.blocked);
+  EXPECT_EQ(s.verdict, Verdict::hidden);
+  EXPECT_NEAR(s.hit_distance, 34, 0.1) << "where the plain rises above the ray";
+  EXPECT_LT(s.clearance, -2);
+}
+
+// Depths: the raw samples' scale is negative, so the least of them is the highest place.
+TEST(GrazingRaysOverDepths, AreHiddenByARidge) {
+  GridFolder folder;
+  Database db = folder.database();
+  const std::string file =
+      folder.write({.width = 61,
+                    .height = 40,
+                    .geotransform = {0, 10, 0, 400, 0, -10},
+                    .at = [](int i, int) { return i == 30            ? 20.0
+                                                  : i < 10 || i > 50 ? 100.0
+                                                                     : 150.0; }},
+                   "depths");
+  {
+    const GDALDatasetUniquePtr raw(GDALDataset::Open(file.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+    ASSERT_TRUE(raw && raw->GetRasterBand(1)->SetScale(-1) == CE_None);
+  }
+  db.import(RasterSource::open(file, {.accuracy = 0.1}, ""), {.name = "depths"});
+  for (const int k : {0, 1, 2}) {
+    const SightLines lines(db, extract(db, {.error = 0}).patches, {.smoothness = k});
+    const SightRay ray{{55, 200, -98}, {555, 200, -98}};
+    EXPECT_TRUE(lines.find({&ray, 1}, kFlat)[0].blocked) << "k = " << k;
+    const SightRay above{{55, 200, 20}, {555, 200, 20}};
+    EXPECT_FALSE(lines.find({&above, 1}, kFlat)[0].blocked) << "k = " << k;
+  }
 }
 
 // A level plain of 50 m, 30 km wide.

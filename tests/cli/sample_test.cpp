@@ -45,14 +45,27 @@ TEST_F(Sample, AnswersWithPointHeightBoundAndGrid) {
 
 TEST_F(Sample, TakesEveryUsualFormOfAPoint) {
   const std::string want = sample("500105 4999895\n").at(0);
-  for (const char* form :
-       {"500105 4999895", "500105,4999895\n", "500105;4999895\n", "500105\t4999895\r\n",
-        "  500105   4999895  77 name\n", "+500105 4.999895e6\n", "# a comment\n\n500105 4999895\n",
-        "x,y\n500105,4999895\n", "x y\r\n500105 4999895\r\n", "name,y,x\na,4999895,500105\n",
-        "\"x\",\"y\",\"z\"\n500105,4999895,3\n", "east north\n500105 4999895\n", ",x,y\n0,500105,4999895\n",
-        "id,name,x,y,z\n7,,500105,4999895,310\n", "\tx\ty\n0\t500105\t4999895\n",
-        "name,x,y\n\"Lake, 2\",500105,4999895\n", "id Northing Easting\n3 4999895 500105\n",
-        "name;x;y\nLake 2;500105;4999895\n", "# a comment\nx,y\n500105,4999895\n"}) {
+  for (const char* form : {"500105 4999895",
+                           "500105,4999895\n",
+                           "500105;4999895\n",
+                           "500105\t4999895\r\n",
+                           "  500105   4999895  77 name\n",
+                           "+500105 4.999895e6\n",
+                           "# a comment\n\n500105 4999895\n",
+                           "x,y\n500105,4999895\n",
+                           "x y\r\n500105 4999895\r\n",
+                           "name,y,x\na,4999895,500105\n",
+                           "\"x\",\"y\",\"z\"\n500105,4999895,3\n",
+                           "east north\n500105 4999895\n",
+                           ",x,y\n0,500105,4999895\n",
+                           "id,name,x,y,z\n7,,500105,4999895,310\n",
+                           "\tx\ty\n0\t500105\t4999895\n",
+                           "name,x,y\n\"Lake, 2\",500105,4999895\n",
+                           "id Northing Easting\n3 4999895 500105\n",
+                           "name;x;y\nLake 2;500105;4999895\n",
+                           "\xEF\xBB\xBFx,y\n500105,4999895\n",
+                           "name,z,x,y\n\"a \"\"b\"\", c\",310,500105,4999895\n",
+                           "# a comment\nx,y\n500105,4999895\n"}) {
     const Words lines = sample(form);
     ASSERT_EQ(lines.size(), 1u) << form;
     EXPECT_EQ(lines[0], want) << form;

@@ -46,7 +46,9 @@ class Copy {
       heights.push_back(original_.grids()[0].info.lowest + (k * 7 + number) % 64 / 8.0);
     const std::string file = folder_.path(fmt::format("probe{}.tif", number));
     write(file, place, heights);
-    return RasterSource::open(file, {.crs = original_.crs(), .accuracy = accuracy(number)}, original_.crs());
+    RasterOptions options{.accuracy = accuracy(number)};
+    if (!original_.crs().empty()) options.crs = original_.crs();
+    return RasterSource::open(file, options, original_.crs());
   }
 
  private:

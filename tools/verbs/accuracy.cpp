@@ -37,14 +37,13 @@ void write_map(const Evaluator& surface, const Database& db, const Raster& r, co
   d.geotransform = {r.xmin, r.step, 0, r.ymax, 0, -r.step};
   d.bands = {{.name = "bound", .unit = "m"}};
   ProgressBar bar(common, "accuracy", double(r.width) * r.height / 1e6, "Mpx");
-  const auto show = [&](double share) { bar.show(share); };
-  Resampler resampler(surface, r, {"bound"}, common.memory, show);
+  Resampler resampler(surface, r, {"bound"}, common.memory, [&](double share) { bar.show(share); });
   write_cog(
       o.map, d,
       [&](int factor, int row, int rows, std::span<float* const> bands) {
         resampler.rows(factor, row, rows, bands);
       },
-      show);
+      [](double) {});
 }
 
 Json json_of(const Accuracy::Place& p) {
@@ -89,7 +88,8 @@ void run(const Options& o, const Common& common) {
   const bool whole = o.region.extent.empty() && o.region.polygon.empty();
   const Extent extent = whole ? db.extent() : region.bounds();
   const Raster raster = Raster::covering(extent, step_of(db, extent, o.step));
-  const Extraction x = extract(db, {.error = o.surface.error, .region = Region::inside(extent)});
+  const Extraction x =
+      extract(db, {.error = o.surface.error, .region = Region::inside(extent), .strict = o.surface.strict});
   const auto surface = make_evaluator(db, x.patches, o.surface, common.memory);
   Area area{.frame = raster.frame(), .width = raster.width, .height = raster.height};
   if (!whole) area.inside = [&](Point p) { return region.contains(p); };

@@ -101,9 +101,9 @@ class ImportRun {
   Json one(const std::vector<std::string>& files) {
     std::optional<Database> db;
     if (std::filesystem::exists(o_.database)) db = Database::open_or_create(o_.database, "", common_.memory);
-    if (db && !o_.crs.empty() && db->crs() != o_.crs && !same_crs(db->crs(), o_.crs))
-      throw Error(o_.database, "its CRS is not " + o_.crs, "leave --crs out, or make another database");
     const bool settled = db && (!db->grids().empty() || !db->crs().empty());
+    if (settled && !o_.crs.empty() && db->crs() != o_.crs && !same_crs(db->crs(), o_.crs))
+      throw Error(o_.database, "its CRS is not " + o_.crs, "leave --crs out, or make another database");
     const RasterSource source = open_source(o_, files, settled ? db->crs() : o_.crs);
     if (settled && db->crs().empty() && !source.crs().empty())
       throw Error(files.front(), "it has a CRS and the database has none: their places cannot be compared",
@@ -139,23 +139,29 @@ class ImportRun {
     const std::string name = !o_.name.empty() ? o_.name : !o_.replace.empty() ? o_.replace : stem;
     const double megasamples = double(source.width()) * source.height() / 1e6;
     ProgressBar bar(common_, "import " + name, megasamples, "Msamples");
-    // A database that this run made goes with an interrupt, too, if nothing came into it from elsewhere
-    // before nobody else could write any more: that is when progress begins.
+    // A database that this run made goes with an interrupt, too, if it is empty and as long as nobody else
+    // can write to it: while progress is between 0 and 1.
     std::optional<UnfinishedFiles> unfinished;
-    const ImportReport report = db.import(
-        source,
-        {.name = name,
-         .memory = common_.memory,
-         .dry_run = o_.dry_run,
-         .tolerance = o_.tolerance,
-         .replace = o_.replace,
-         .progress = [&](double share) {
-           if (share == 0 && db.made_file() && db.grids().empty())
-             unfinished.emplace(std::vector<std::string>{db.path(), db.path() + "-wal", db.path() + "-shm"});
-           bar.show(share);
-         }});
-    if (unfinished) unfinished->keep();
-    return report;
+    const auto others_may_write = [&] {
+      if (unfinished) unfinished->keep();
+    };
+    try {
+      return db.import(source, {.name = name,
+                                .memory = common_.memory,
+                                .dry_run = o_.dry_run,
+                                .tolerance = o_.tolerance,
+                                .replace = o_.replace,
+                                .progress = [&](double share) {
+                                  if (share == 0 && db.made_file() && db.grids().empty())
+                                    unfinished.emplace(std::vector<std::string>{db.path(), db.path() + "-wal",
+                                                                                db.path() + "-shm"});
+                                  if (share == 1) others_may_write();
+                                  bar.show(share);
+                                }});
+    } catch (...) {
+      others_may_write();
+      throw;
+    }
   }
 
   const Options& o_;

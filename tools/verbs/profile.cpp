@@ -34,7 +34,8 @@ void run(const Options& o, const Common& common) {
   const Database db = Database::open(o.database, common.memory);
   const std::vector<Point> line = parse_points("line", o.line);
   const Extent around = bounds_of(line);
-  const Extraction x = extract(db, {.error = o.surface.error, .region = Region::inside(around)});
+  const Extraction x =
+      extract(db, {.error = o.surface.error, .region = Region::inside(around), .strict = o.surface.strict});
   const auto surface = make_evaluator(db, x.patches, o.surface, common.memory);
   const Profile p = profile_along(*surface, line, o.step > 0 ? o.step : finest_step(db, around));
   const auto name = [&](std::int32_t source) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "db/error.h"
 #include "render/hillshade.h"
@@ -16,6 +17,8 @@ namespace patchwork::cli {
 
 namespace {
 
+constexpr double kEvaluating =
+    0.8;  // about this part of the time, where all is evaluated before it is written
 constexpr double kPictureSide = 1200;  // pixels of the longer side that pictures are made from
 
 struct Options {
@@ -125,20 +128,23 @@ void run(const Options& o, const Common& common) {
   const Extent extent = o.region.extent.empty() ? to_micrometres(db.extent()) : o.region.region().bounds();
   const Raster raster = Raster::covering(extent, o.step > 0 ? o.step : finest_step(db, extent));
   const double open_seconds = seconds_since(start);
-  const Extraction x = extract(db, {.error = o.surface.error, .region = Region::inside(extent)});
+  const Extraction x =
+      extract(db, {.error = o.surface.error, .region = Region::inside(extent), .strict = o.surface.strict});
   const double fetch_seconds = prefetch(db, x.patches, common.memory);
   const std::unique_ptr<Evaluator> blend = make_evaluator(db, x.patches, o.surface, common.memory);
   const auto writing = std::chrono::steady_clock::now();
-  ProgressBar bar(common, "resample", double(raster.width) * raster.height / 1e6, "Mpx");
-  Resampler resampler(*blend, raster, o.bands, common.memory, [&](double share) { bar.show(share); });
-  {
-    write_cog(
-        o.out, describe(db, raster, o),
-        [&](int factor, int row, int rows, std::span<float* const> bands) {
-          resampler.rows(factor, row, rows, bands);
-        },
-        [&](double share) { bar.show(share); });
-  }
+  std::optional<ProgressBar> bar;
+  bar.emplace(common, "resample", double(raster.width) * raster.height / 1e6, "Mpx");
+  Resampler resampler(*blend, raster, o.bands, common.memory,
+                      [&](double share) { bar->show(kEvaluating * share); });
+  const double before = resampler.whole() ? kEvaluating : 0;
+  write_cog(
+      o.out, describe(db, raster, o),
+      [&](int factor, int row, int rows, std::span<float* const> bands) {
+        resampler.rows(factor, row, rows, bands);
+      },
+      [&](double share) { bar->show(before + (1 - before) * share); });
+  bar.reset();
   const double write_seconds = seconds_since(writing) - resampler.tally().blend_seconds;
   const auto drawing = std::chrono::steady_clock::now();
   const Raster small = picture_raster(raster);

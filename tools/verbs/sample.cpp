@@ -40,7 +40,7 @@ class Fields {
 
   bool more() const { return more_; }
   std::string_view next() {
-    const std::size_t from = !left_.empty() && left_.front() == '"' ? left_.find('"', 1) : 0;
+    const std::size_t from = behind_quotes();
     const std::size_t to = separator_ ? left_.find(separator_, std::min(from, left_.size()))
                                       : left_.find_first_of(kBlanks, std::min(from, left_.size()));
     std::string_view field = trimmed(left_.substr(0, to));
@@ -53,6 +53,15 @@ class Fields {
   }
 
  private:
+  // Where a field begins that may end at a separator: behind what is quoted, in which two quotes are one.
+  std::size_t behind_quotes() const {
+    if (left_.empty() || left_.front() != '"') return 0;
+    std::size_t at = left_.find('"', 1);
+    while (at != std::string_view::npos && at + 1 < left_.size() && left_[at + 1] == '"')
+      at = left_.find('"', at + 2);
+    return at;
+  }
+
   std::string_view left_;
   bool more_;
   char separator_ = 0;  // 0: blanks
@@ -76,13 +85,14 @@ class Sampler {
  public:
   Sampler(const Database& db, const Options& o, std::uint64_t memory)
       : db_(db),
-        patches_(extract(db, {.error = o.surface.error}).patches),
+        patches_(extract(db, {.error = o.surface.error, .strict = o.surface.strict}).patches),
         blend_(make_evaluator(db, patches_, o.surface, memory)) {}
 
   // The first line may be a header, which says which columns are x and y.
   void read(std::istream& in) {
     std::string line;
     for (std::size_t number = 1; std::getline(in, line); ++number) {
+      if (number == 1 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // a mark of UTF-8
       Fields fields(line);
       if (!fields.more() || line[0] == '#') continue;
       double values[2];

@@ -197,6 +197,7 @@ struct Renderer::Impl {
     tile.farthest = std::hypot(std::max(camera.eye.x - e.xmin, e.xmax - camera.eye.x),
                                std::max(camera.eye.y - e.ymin, e.ymax - camera.eye.y),
                                std::max(camera.eye.z - tile.lowest, tile.highest - camera.eye.z));
+    tile.lowest_air = std::min(tile.lowest, camera.eye.z);
     return std::uint32_t(effects.matter_to(tile).to_ulong());
   }
 

@@ -76,7 +76,7 @@ void TileFetcher::release(bool moved) {
   {
     const std::scoped_lock lock(mutex_);
     held_ = false;
-    if (moved) ready_.clear();
+    if (moved) ready_.clear(), queue_.clear();  // they may be of another lattice
   }
   more_.notify_all();
 }

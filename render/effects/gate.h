@@ -18,9 +18,10 @@ struct SceneView {
 
 /// Of a tile.
 struct TileView {
-  double lowest = 0, highest = 0;                             ///< metres
-  double farthest = 0;                                        ///< metres to its farthest point
-  double steepest = std::numeric_limits<double>::infinity();  ///< as above, of its own places
+  double lowest = 0, highest = 0;                                ///< metres
+  double farthest = 0;                                           ///< metres to its farthest point
+  double steepest = std::numeric_limits<double>::infinity();     ///< as above, of its own places
+  double lowest_air = -std::numeric_limits<double>::infinity();  ///< metres: between the eye and it
 };
 
 /// Half a step of an 8-bit channel either way: what a gate may neglect, of sRGB's 0 to 1.

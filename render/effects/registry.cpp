@@ -41,7 +41,7 @@ constexpr Entry kRegistry[] = {
     // The sky shows it from any distance, and water mirrors the sky.
     {Id::haze, "haze", kNothing, named<&E::haze>,
      [](const Scene& s, const TileView& t) {
-       return wet(s, t) || most_change(*s.effects.haze, t.farthest, t.lowest) > kInvisible;
+       return wet(s, t) || most_change(*s.effects.haze, t.farthest, t.lowest_air) > kInvisible;
      }},
     {Id::curvature, "curvature", kNothing,
      [](const Scene& s, const SceneView& v) {

@@ -11,6 +11,9 @@ layout(constant_id = 9) const bool has_source = false;
 layout(constant_id = 10) const bool has_contours = false;
 layout(constant_id = 11) const bool has_cost = false;   // with has_scale: patches of the tile, not bounds
 layout(constant_id = 12) const bool is_wireframe = false;
+// Of the whole picture, whatever matters to the tile that is drawn.
+layout(constant_id = 13) const bool is_dithered = false;
+layout(constant_id = 14) const bool is_plain = true;  // as the benchmark's peers draw (tools/bench/peer_slopes.frag)
 
 #include "render/effects/look.glsl"
 layout(binding = 5) uniform LookBlock { Look look; };
@@ -42,6 +45,5 @@ vec3 class_color(int source) { return texelFetch(ramps, 2 * kRamp + clamp(abs(so
 
 // Of the pixel that the shader makes.
 vec4 picture_color(vec3 light) {
-  const bool smooth_colors = has_haze || has_disc || has_water;
-  return vec4(srgb(light) + (smooth_colors ? dither(gl_FragCoord.x, gl_FragCoord.y) : 0.0), 1);
+  return vec4(srgb(light) + (is_dithered ? dither(gl_FragCoord.x, gl_FragCoord.y) : 0.0), 1);
 }

@@ -128,8 +128,13 @@ void FrameEffects::draw_legend(Image& picture) const {
   if (!ramps.empty() || !classes.empty()) draw_legends(picture, ramps, classes);
 }
 
-std::vector<std::uint32_t> FrameEffects::constants(const effects::Set& set, bool holes, bool wireframe) {
+std::vector<std::uint32_t> FrameEffects::constants(const effects::Set& set, bool holes,
+                                                   bool wireframe) const {
   const auto is = [&](Id id) { return std::uint32_t(has(set, id)); };
+  const bool smooth_colors = has(on_, Id::haze) || has(on_, Id::solar_disc) || has(on_, Id::water);
+  effects::Set shading = on_;  // what changes the colour of the ground
+  for (const Id id : {Id::shadow, Id::curvature, Id::solar_disc, Id::wireframe})
+    shading[std::size_t(id)] = false;
   return {holes,
           is(Id::sun),
           is(Id::shadow),
@@ -142,7 +147,9 @@ std::vector<std::uint32_t> FrameEffects::constants(const effects::Set& set, bool
           is(Id::source),
           is(Id::contours),
           is(Id::cost),
-          wireframe};
+          wireframe,
+          smooth_colors,
+          shading.none() && !wireframe};
 }
 
 }  // namespace patchwork::vk

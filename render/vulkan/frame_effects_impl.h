@@ -29,6 +29,7 @@ class FrameEffects {
   bool prepare(effects::SceneView view, std::span<const float> bounds, const LightBudget& budget);
   /// Samples and texels of light that are still to come.
   std::size_t light_left() const {
+    if (db_.grids().empty()) return 0;
     return map_.left(has(on_, effects::Id::shadow), has(on_, effects::Id::sky));
   }
   std::size_t light_texels() const { return map_.texels_made; }
@@ -52,8 +53,8 @@ class FrameEffects {
       VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER};
   void bind(const Bindings& bindings, VkDescriptorSet set, const TileStore& store) const;
   unsigned generation() const { return map_.generation(); }
-  /// Specialization constants of effects.glsl behind `holes`.
-  static std::vector<std::uint32_t> constants(const effects::Set& set, bool holes, bool wireframe);
+  /// Specialization constants of effects.glsl behind `holes`, for what needs `set` of this picture's effects.
+  std::vector<std::uint32_t> constants(const effects::Set& set, bool holes, bool wireframe) const;
   /// What of this picture a tile needs.
   effects::Set matter_to(const effects::TileView& tile) const {
     return (on_ & ~kGated) | (effects::matter_to(scene_, on_, tile) & kGated);

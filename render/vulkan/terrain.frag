@@ -29,12 +29,9 @@ Ground ground_here() {
   return g;
 }
 
-const bool is_plain = !(has_sun || has_sky || has_water || has_haze || has_tints || has_scale || has_source ||
-                        has_contours || is_wireframe);
-
 void main() {
   if (kHoles && local.z < -0.5) discard;
-  if (is_plain) {  // as the benchmark's peers draw (tools/bench/peer_slopes.frag)
+  if (is_plain) {
     const vec3 n = normalize(vec3(-texture(slopes, of_slot(local.xy)).xy, 1));
     color = vec4(vec3(0.78, 0.76, 0.7) * (0.25 + 0.75 * max(dot(n, normalize(vec3(-0.5, 0.5, 0.7))), 0.0)), 1);
     return;

@@ -24,8 +24,7 @@ constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_ST
                                        VK_SHADER_STAGE_FRAGMENT_BIT;
 
 OwnedPipeline terrain_pipeline(const Bindings& bindings, VkRenderPass pass, const Subdivision& subdivision,
-                               const effects::Set& effects, bool holes, bool edges) {
-  const std::vector<std::uint32_t> constants = FrameEffects::constants(effects, holes, edges);
+                               std::span<const std::uint32_t> constants, bool edges) {
   std::vector<GraphicsState::Stage> stages = subdivision.stages();
   stages.push_back({VK_SHADER_STAGE_FRAGMENT_BIT, shaders::terrain_frag()});
   return make_graphics(bindings, pass,
@@ -35,8 +34,8 @@ OwnedPipeline terrain_pipeline(const Bindings& bindings, VkRenderPass pass, cons
                         .lines = edges});
 }
 
-OwnedPipeline sky_pipeline(const Bindings& bindings, VkRenderPass pass, const effects::Set& effects) {
-  const std::vector<std::uint32_t> constants = FrameEffects::constants(effects, false, false);
+OwnedPipeline sky_pipeline(const Bindings& bindings, VkRenderPass pass,
+                           std::span<const std::uint32_t> constants) {
   return make_graphics(bindings, pass,
                        {.stages = {{VK_SHADER_STAGE_VERTEX_BIT, shaders::sky_vert()},
                                    {VK_SHADER_STAGE_FRAGMENT_BIT, shaders::sky_frag()}},
@@ -86,26 +85,30 @@ std::size_t TerrainPass::record_subdivision(VkCommandBuffer commands) const {
   return subdivision_->dispatches();
 }
 
-TerrainPass::Pipelines& TerrainPass::with_pipelines(const FrameEffects& effects, const effects::Set& set,
-                                                    bool holes) {
-  Pipelines& p = pipelines_[set.to_ulong()];
-  if (!p.ground[holes])
-    p.ground[holes] = terrain_pipeline(bindings_, pass_, *subdivision_, set, holes, false);
-  if (has(effects.on(), effects::Id::wireframe) && !p.edges[holes])
-    p.edges[holes] = terrain_pipeline(bindings_, pass_, *subdivision_, set, holes, true);
-  return p;
+TerrainPass::Pipelines& TerrainPass::pipelines(const FrameEffects& effects, const effects::Set& set) {
+  return pipelines_[{effects.on().to_ulong(), set.to_ulong()}];
 }
 
 void TerrainPass::use(const FrameEffects& effects) {
   if (generation_ != effects.generation()) effects.bind(bindings_, set_, store_);
   generation_ = effects.generation();
   used_.clear();
-  for (const DrawGroup& g : groups_)
-    used_.push_back(&with_pipelines(effects, effects::Set(g.effects), g.holes));
+  for (const DrawGroup& g : groups_) {
+    const effects::Set set(g.effects);
+    Pipelines& p = pipelines(effects, set);
+    const auto make = [&](OwnedPipeline& pipeline, bool edges) {
+      if (!pipeline)
+        pipeline =
+            terrain_pipeline(bindings_, pass_, *subdivision_, effects.constants(set, g.holes, edges), edges);
+    };
+    make(p.ground[g.holes], false);
+    if (has(effects.on(), effects::Id::wireframe)) make(p.edges[g.holes], true);
+    used_.push_back(&p);
+  }
   sky_ = nullptr;
   if (!effects.draws_sky()) return;
-  Pipelines& p = pipelines_[effects.on().to_ulong()];
-  if (!p.sky) p.sky = sky_pipeline(bindings_, pass_, effects.on());
+  Pipelines& p = pipelines(effects, effects.on());
+  if (!p.sky) p.sky = sky_pipeline(bindings_, pass_, effects.constants(effects.on(), false, false));
   sky_ = &p;
 }
 

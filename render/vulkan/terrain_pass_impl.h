@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "blend/vulkan/pipeline_impl.h"
@@ -43,17 +44,17 @@ class TerrainPass {
   const Subdivision& subdivision() const { return *subdivision_; }
 
  private:
-  // Of one set of effects; what was not needed yet is none.
+  // Of one set of a picture's effects; what was not needed yet is none.
   struct Pipelines {
     std::array<OwnedPipeline, 2> ground, edges;  // without and with holes
     OwnedPipeline sky;
   };
-  Pipelines& with_pipelines(const FrameEffects& effects, const effects::Set& set, bool holes);
+  Pipelines& pipelines(const FrameEffects& effects, const effects::Set& set);
   const TileStore& store_;
   VkRenderPass pass_;
   Bindings bindings_;
-  std::map<unsigned long, Pipelines> pipelines_;  // by the set of effects
-  std::vector<const Pipelines*> used_;            // by each group
+  std::map<std::pair<unsigned long, unsigned long>, Pipelines> pipelines_;  // by the picture's and the set
+  std::vector<const Pipelines*> used_;                                      // by each group
   const Pipelines* sky_ = nullptr;
   unsigned generation_ = 0;
   VkDescriptorSet set_ = VK_NULL_HANDLE;

@@ -277,8 +277,16 @@ std::vector<TileMaker::Made> TileMaker::make(std::span<const TileKey> tiles, con
 }
 
 void TileMaker::prefetch(const Database& db, const TileLattice& lattice, const TileKey& tile) {
-  const Extraction x = extract(db, TileCut(lattice.error(tile.level), {with_halo(lattice, tile)}));
-  for (const PatchId id : x.patches) db.surface(id);
+  const Extent place = with_halo(lattice, tile);
+  std::vector<PatchId> patches = extract(db, TileCut(lattice.error(tile.level), {place})).patches;
+  for (const PatchId id : patches) db.surface(id);
+  // Making it asks for more records and pages than those.
+  {
+    const Database::Reading reading = db.reading();
+    for (const PatchId id : patches) missed(db.grid(id.grid()), id, 0.5 * lattice.step(tile.level));
+  }
+  std::sort(patches.begin(), patches.end());
+  if (lattice.error(tile.level) > 0) is_improvable(db, patches, place);
 }
 
 void TileMaker::restart() {

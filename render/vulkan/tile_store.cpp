@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "db/error.h"
 #include "render/vulkan/subdivision_impl.h"
 
 namespace patchwork::vk {
@@ -14,6 +15,7 @@ constexpr VkBufferUsageFlags kUsage =
 
 constexpr std::size_t kHalfCells = 4 * TileLattice::kSamples * TileLattice::kSamples;  // pairs of half floats
 constexpr std::size_t kIndexBytes = kMostTriangles * 12;
+constexpr std::size_t kLeastSlots = 16;
 
 // Two texels of tile_finish.comp; or kBlock of mesh_codes.glsl.
 std::size_t block_bytes(const TileStore::Holds& holds) { return holds.meshes ? 7 * 16 : 2 * 16; }
@@ -36,10 +38,11 @@ std::uint32_t TileStore::slots_within(const Device::Impl& device, std::size_t by
   const VkPhysicalDeviceLimits& limits = device.properties.limits;
   const std::size_t slot = 4 * kHeights + kHalfCells + holds.knowledge * kHalfCells +
                            block_bytes(holds) * kBlocks + holds.meshes * kIndexBytes;
-  const std::size_t most = std::min<std::size_t>(
-      {bytes / slot, limits.maxImageArrayLayers, limits.maxTexelBufferElements / kHeights,
-       holds.meshes ? limits.maxStorageBufferRange / kIndexBytes : SIZE_MAX});
-  return std::uint32_t(std::max<std::size_t>(most, 16));
+  const std::size_t most =
+      std::min<std::size_t>({limits.maxImageArrayLayers, limits.maxTexelBufferElements / kHeights,
+                             holds.meshes ? limits.maxStorageBufferRange / kIndexBytes : SIZE_MAX});
+  if (most < kLeastSlots) throw Error(device.name, "its buffers are too small for the tiles of a picture");
+  return std::uint32_t(std::clamp<std::size_t>(bytes / slot, kLeastSlots, most));
 }
 
 TileStore::TileStore(const Device::Impl& device, std::uint32_t n, const Holds& what)

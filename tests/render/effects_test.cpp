@@ -228,8 +228,11 @@ TEST(TileGate, WhatItLeavesOutChangesNoPixel) {
     s.effects.water->level = 100 + 400 * any(random);
     LookInput input{a_view(), {0, 900, false}, {0, 10, false}};
     const double low = 600 * any(random), range = std::exp(5 * any(random));
-    input.view.camera.eye.z = low + range * any(random);
-    const TileView tile{low, low + range, range + std::exp(9 * any(random)), std::exp(-4 + 5 * any(random))};
+    input.view.camera.eye.z = low + range * (n % 2 ? any(random) : 10 * any(random) - 10);
+    s.effects.haze->scale_height = std::exp(4 + 5 * any(random)), s.effects.haze->base = 600 * any(random);
+    const double away = std::max(0.0, low - input.view.camera.eye.z) + range + std::exp(9 * any(random));
+    const TileView tile{low, low + range, away, std::exp(-4 + 5 * any(random)),
+                        std::min(low, input.view.camera.eye.z)};
     Set all;
     for (std::size_t k = 0; k < effects::kEffects; ++k) all[k] = k < std::size_t(Id::error);
     const Set matter = effects::matter_to(s, all, tile);

@@ -23,6 +23,12 @@ struct Parabola {
   double rise() const { return slope * slope / (-4 * bend); }  // of the peak above b
 };
 
+// A share of the bound above (1) or below (-1) the surface, in its place.
+SightSample with_bound(SightSample s, double share) {
+  s.above += share * s.bound;
+  return s;
+}
+
 }  // namespace
 
 std::optional<HitSearch> HitSearch::between(const std::vector<SightSample>& samples, double touching,
@@ -73,16 +79,25 @@ void find_humps(const std::vector<SightSample>& s, double miss,
     const SightSample &a = s[k - 1], &b = s[k], &c = s[k + 1];
     if (b.place <= SightPlace::line) continue;
     const Parabola p(a, b, c);
-    double enough = a.t < hit ? std::min(most, 0.0) + miss : most + miss;
-    // Where bounds differ, a lower hump may be what decides.
-    if (!may) enough = std::min(enough, miss - std::max({a.bound, b.bound, c.bound}));
-    if (!must) enough = std::min(enough, miss + std::min({a.bound, b.bound, c.bound}));
+    const double enough = a.t < hit ? std::min(most, 0.0) + miss : most + miss;
     const double seen = std::max({a.above, b.above, c.above}), half = 0.5 * (c.t - a.t);
     const bool peaks = p.bend < 0 && p.peak() > a.t && p.peak() < c.t && p.peak() != b.t;
     if (b.place == SightPlace::parabola) {
-      if (peaks && b.above + p.rise() > seen && b.above + p.rise() > enough) take(p.peak(), b.place);
-    } else if (const double hump = kHumps * std::abs(p.bend) * half * half;
-               hump > miss && seen + hump > enough) {
+      // Where one patch speaks its bound is the same all over.
+      const double peak = b.above + p.rise();
+      const bool decides = (!may && peak + b.bound > miss) || (!must && peak - b.bound > miss);
+      if (peaks && ((peak > seen && peak > enough) || decides)) take(p.peak(), b.place);
+      continue;
+    }
+    // Could the surface, or the end of its bound that decides, come up so high between the samples?
+    const auto may_reach = [&](double share, double height) {
+      const Parabola q(with_bound(a, share), with_bound(b, share), with_bound(c, share));
+      const double hump = kHumps * std::abs(q.bend) * half * half;
+      const double top =
+          std::max({a.above + share * a.bound, b.above + share * b.bound, c.above + share * c.bound});
+      return hump > miss && top + hump > height;
+    };
+    if (may_reach(0, enough) || (!may && may_reach(1, miss)) || (!must && may_reach(-1, miss))) {
       take(0.5 * (a.t + b.t), b.place), take(0.5 * (b.t + c.t), b.place);
       if (peaks) take(p.peak(), b.place);
     }

@@ -10,6 +10,7 @@
 
 #include "blend/blend.h"
 #include "blend/vulkan/device.h"
+#include "blend/vulkan/vulkan_blend.h"
 #include "render/camera.h"
 #include "render/picture.h"
 #include "render/scene.h"
@@ -70,6 +71,7 @@ struct FrameStats {
   double bound_max = 0;                                   ///< metres: of all heights drawn
   bool redrawn = false;                                   ///< else the picture is that of the frame before
   BlendCounts blended;                                    ///< of the tiles made
+  BlockShares blocks;                                     ///< the same: inside are copied, partial blended
   std::size_t shadow_dispatches = 0, sky_dispatches = 0;  ///< of the light map
   std::size_t light_texels = 0, light_left = 0;  ///< of it made; heights and texels that are still to come
 };

@@ -19,6 +19,8 @@ void note_made(const TileMakerCounts& before, const TileMakerCounts& after, Fram
   stats.extract_ms = after.extract_ms - before.extract_ms, stats.send_ms = after.send_ms - before.send_ms;
   stats.blend_ms = after.blend_ms - before.blend_ms, stats.finish_ms = after.finish_ms - before.finish_ms;
   stats.blended = after.blended;
+  stats.blocks = {after.blocks.out - before.blocks.out, after.blocks.inside - before.blocks.inside,
+                  after.blocks.partial - before.blocks.partial};
   stats.blended.points -= before.blended.points;
   stats.blended.contributions -= before.blended.contributions;
 }

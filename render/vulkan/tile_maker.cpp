@@ -198,6 +198,7 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
   VulkanBlend::Impl& b = blend->impl();
   const RasterFrame frame = lattice.frame();
   const auto start = std::chrono::steady_clock::now();
+  const BlockShares before = blend->shares();
   double finishing = 0;
   const BlendCounts now = b.run(
       frame, sampled, kSide,
@@ -218,6 +219,9 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
         }
         finishing += ms_since(begun);
       });
+  const BlockShares after = blend->shares();
+  counts.blocks.out += after.out - before.out, counts.blocks.inside += after.inside - before.inside;
+  counts.blocks.partial += after.partial - before.partial;
   counts.blended.points += now.points, counts.blended.contributions += now.contributions;
   counts.blended.most = std::max(counts.blended.most, now.most);
   counts.blended.bound_max = std::max(counts.blended.bound_max, now.bound_max);

@@ -19,6 +19,7 @@ struct TileMakerCounts {
   std::uint64_t tiles = 0, patches = 0, bytes = 0;  ///< made; sent to the card
   std::uint64_t dispatches = 0;                     ///< of tile_finish.glsl
   BlendCounts blended;                              ///< of all samples of the tiles made
+  BlockShares blocks;                               ///< the same by blocks of 8 x 8
   double extract_ms = 0, send_ms = 0, blend_ms = 0, finish_ms = 0;
 };
 

@@ -123,11 +123,10 @@ class ImportRun {
     if (o_.dry_run && db->made_file()) db->remove_if_empty();
     std::vector<std::string> warnings = source.warnings();
     if (report.quantisation > std::max(report.accuracy, o_.tolerance)) {
-      warnings.push_back(
-          fmt::format("its heights reach so far that they are stored to within {:g} m only: is there a value "
-                      "that means no "
-                      "data? give it with --nodata",
-                      report.quantisation));
+      warnings.push_back(fmt::format(
+          "its heights reach so far that they are stored to within {:g} m only; a value that means no "
+          "data is given with --nodata",
+          report.quantisation));
       note(common_, files.front() + ": " + warnings.back());
     }
     if (!common_.json && !common_.quiet) fmt::print("{}\n", text_of(report, o_.dry_run, compared));

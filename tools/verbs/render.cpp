@@ -79,6 +79,7 @@ Json facts(const FrameStats& s) {
           {"patches", s.patches_sent},
           {"tiles_drawn", s.tiles_drawn},
           {"tiles_made", s.tiles_made},
+          {"blocks", {{"copied", s.blocks.inside}, {"blended", s.blocks.partial}, {"beside", s.blocks.out}}},
           {"triangles", s.triangles},
           {"dispatches", s.dispatches},
           {"draws", s.draws},

@@ -234,6 +234,7 @@ TEST_F(GrazingRays, MissNothingThatDenseMarchingSees) {
     }
   report_case("GrazingRays", "dense marching sees more of a ray blocked, at most", blocked + open,
               std::max(worst, 0.0), SightLines::kClearance, "m");
+  report_law("GrazingRays", "verdicts hold by the bounds at every step of a dense march", blocked + open);
   EXPECT_GT(std::min(blocked, open), trials() / 10);
   EXPECT_GT(searched, trials() / 20);
   EXPECT_GT(undecided, trials() / 50);

@@ -20,10 +20,9 @@ float up(double v) {
   return double(f) < v ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
 }
 
-// The largest code (the least one, negative, where `sign` is -1) that an interpolant takes over cells
-// [i0, i1) x [j0, j1) (window): the largest sample and,
-// where it is not linear, an eighth of the largest second differences it reads; those across rows once more
-// by what the rows' own weights add up to (db/basis.h).
+// The largest of `sign` (1 or -1) times the codes that an interpolant takes over cells [i0, i1) x [j0, j1)
+// (window): the largest sample and, where it is not linear, an eighth of the largest second differences it
+// reads; those across rows once more by what the rows' own weights add up to (db/basis.h).
 double most_of(const float* codes, double sign, int i0, int j0, int i1, int j1, int smoothness) {
   const auto at = [&](int i, int j) { return sign * double(codes[j * kSide + i]); };
   double most = -INFINITY, along = 0, across = 0;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <set>
 
 #include "render/effects/relief.h"
@@ -20,13 +21,15 @@ using effects::Id;
 constexpr int kWidth = 256, kHeight = 144;
 const Camera kCamera{{150, 120, 520}, {900, 900, 300}, 60, kWidth, kHeight};
 
-Renderer renderer_of(const Database& db, const SceneEffects& e, double pixel_error = 0.25) {
+Renderer renderer_of(const Database& db, const SceneEffects& e, double pixel_error = 0.25,
+                     std::optional<Tessellation> way = {}) {
   return {test_device(),
           db,
           {.width = kWidth,
            .height = kHeight,
            .pixel_error = pixel_error,
            .memory = std::size_t{256} << 20,
+           .tessellation = way,
            .effects = e,
            .legend = false}};
 }
@@ -262,28 +265,19 @@ TEST_F(CountersTest, ATileIsShadedByWhatCanMatterToIt) {
   const Database db = folder_.database();
   for (const Tessellation way : {Tessellation::hardware, Tessellation::mesh}) {
     SceneEffects e = lit(120, 12);
-    const auto renderer = [&] {
-      return Renderer(test_device(), db,
-                      {.width = kWidth,
-                       .height = kHeight,
-                       .memory = std::size_t{256} << 20,
-                       .tessellation = way,
-                       .effects = e,
-                       .legend = false});
-    };
     const auto wet = [&](const Renderer& r) {
       std::size_t n = 0;
       for (const TileDraw& d : r.drawn().draws) n += has(effects::Set(d.effects), Id::water);
       return n;
     };
-    Renderer dry = renderer();
+    Renderer dry = renderer_of(db, e, 1, way);
     const FrameStats plain = dry.draw(kCamera);
     EXPECT_EQ(wet(dry), 0u);
     const GridInfo& land = db.grids()[0].info;
     std::size_t before = 0;
     for (const double share : {0.01, 0.3, 1.0}) {
       e.water = effects::Water{.level = land.lowest + share * (land.highest - land.lowest)};
-      Renderer r = renderer();
+      Renderer r = renderer_of(db, e, 1, way);
       const FrameStats stats = r.draw(kCamera);
       EXPECT_EQ(stats.triangles, plain.triangles) << "each tile is drawn once";
       EXPECT_GE(wet(r), before);

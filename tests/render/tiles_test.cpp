@@ -325,17 +325,26 @@ std::pair<std::int64_t, std::int64_t> place_of(const TileDraw& d, int s, int t) 
   return s < 2 ? std::pair{d.x + across, d.y + along} : std::pair{d.x + along, d.y + across};
 }
 
+// What some camera draws of some woods.
+struct DrawnWoods {
+  Woods woods;
+  Selection selection;
+  std::vector<TileDraw> draws;
+
+  explicit DrawnWoods(std::uint64_t seed) : woods(seed) {
+    const Camera camera = woods.camera();
+    select_tiles(woods.lattice(), Frustum(camera), {.pixel_error = 1}, woods.cache, selection);
+    make_draws(woods.lattice(), selection, woods.cache, {camera.eye.x, camera.eye.y}, draws);
+  }
+};
+
 TEST(EdgeSplit, WhoeverSharesAVertexReadsTheSameTexel) {
   const std::uint64_t seed = test_seed(11);
   int shared = 0, finer = 0, apart = 0;
   for (std::uint64_t n = 0; n < 40; ++n) {
-    Woods woods(seed + n);
-    const Camera camera = woods.camera();
-    Selection s;
-    select_tiles(woods.lattice(), Frustum(camera), {.pixel_error = 1}, woods.cache, s);
-    std::vector<TileDraw> draws;
-    make_draws(woods.lattice(), s, woods.cache, {camera.eye.x, camera.eye.y}, draws);
-    ASSERT_EQ(draws.size(), s.drawn.size());
+    const DrawnWoods seen(seed + n);
+    const std::vector<TileDraw>& draws = seen.draws;
+    ASSERT_EQ(draws.size(), seen.selection.drawn.size());
     std::map<std::pair<std::int64_t, std::int64_t>, std::uint32_t> texel_at, half_texel_at;
     for (const TileDraw& d : draws)
       for (int side = 0; side < 4; ++side)
@@ -362,15 +371,11 @@ TEST(TileSeams, WhoSharesAVertexWithATileWithHolesCountsAsOneWithHoles) {
   const std::uint64_t seed = test_seed(21);
   std::size_t own = 0, shared = 0, solid = 0;
   for (std::uint64_t n = 0; n < 20; ++n) {
-    Woods woods(seed + n);
-    const Camera camera = woods.camera();
-    Selection s;
-    select_tiles(woods.lattice(), Frustum(camera), {.pixel_error = 1}, woods.cache, s);
-    std::vector<TileDraw> draws;
-    make_draws(woods.lattice(), s, woods.cache, {camera.eye.x, camera.eye.y}, draws);
+    const DrawnWoods seen(seed + n);
+    const std::vector<TileDraw>& draws = seen.draws;
     std::set<std::uint32_t> holed;
-    for (const std::uint32_t k : s.drawn) {
-      const TileCache::Node& node = *woods.cache.find(s.leaves[k].key);
+    for (const std::uint32_t k : seen.selection.drawn) {
+      const TileCache::Node& node = *seen.woods.cache.find(seen.selection.leaves[k].key);
       if (node.facts.holes) holed.insert(node.slot);
     }
     EXPECT_TRUE(std::is_sorted(draws.begin(), draws.end(),
@@ -420,12 +425,8 @@ TEST(EdgeSplit, EverySharedEdgeIsSplitAtTheSamePlaces) {
   const std::uint64_t seed = test_seed(13);
   std::size_t edges = 0, split_apart = 0;
   for (std::uint64_t n = 0; n < 40; ++n) {
-    Woods woods(seed + n);
-    const Camera camera = woods.camera();
-    Selection s;
-    select_tiles(woods.lattice(), Frustum(camera), {.pixel_error = 1}, woods.cache, s);
-    std::vector<TileDraw> draws;
-    make_draws(woods.lattice(), s, woods.cache, {camera.eye.x, camera.eye.y}, draws);
+    const DrawnWoods seen(seed + n);
+    const std::vector<TileDraw>& draws = seen.draws;
     std::mt19937_64 random(seed + n);
     std::vector<std::array<int, 64>> need(draws.size());
     for (auto& tile : need)

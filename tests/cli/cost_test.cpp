@@ -45,12 +45,13 @@ TEST_F(CostTest, EveryMeasuredErrorKeepsToItsBound) {
     EXPECT_LE(double(r["error_max"]), double(r["bound"]) * (drawn ? 1.001 : 1) + (drawn ? 0.01 : 0))
         << r["knob"] << " " << r["value"];
     frames += drawn;
-    EXPECT_EQ(drawn, r["knob"] == "frame" || r["knob"] == "tessellation" || r["knob"] == "sky_directions");
+    EXPECT_EQ(drawn, r["knob"] == "frame" || r["knob"] == "tessellation" || r["knob"] == "sky_directions" ||
+                         (r["knob"] == "reference" && r["unit"] == "px"));
     EXPECT_GT(r["patches"], 0);
     EXPECT_GE(r["ms_blend"], 0);
   }
   EXPECT_EQ(ladder, 15);
-  EXPECT_EQ(frames, 11) << "published tessellation has no bound";
+  EXPECT_EQ(frames, 12) << "published tessellation has no bound";
   EXPECT_EQ(skies, 4) << "no sky light, and that of 4, 8 and 16 directions";
   EXPECT_GT(bounded, 50);
   EXPECT_GT(differ, 20) << "negative control: coarser answers depart from the best";
@@ -91,6 +92,24 @@ TEST_F(CostTest, FilesSayTheSameAndThePageNeedsNothingElse) {
   EXPECT_EQ(page.find("<link"), std::string::npos);
   EXPECT_TRUE(page.ends_with("</html>\n"));
   EXPECT_EQ(facts["budgets"].size(), 20u);
+}
+
+// Two reports compare by the ratios of their times to what is the same in both.
+TEST_F(CostTest, TheReferenceIsTheSameForEveryDatabase) {
+  const std::string database = hill_database();
+  std::vector<Json> references;
+  for (const std::string& folder : {"first", "second"}) {
+    const double reference = json(cost(database, folder))["reference_ms"];
+    Json& seen = references.emplace_back(Json::array());
+    for (const Json& r : rows(folder)) {
+      EXPECT_NEAR(double(r["of_reference"]) * reference, double(r["ms_total"]), 1e-9 * double(r["ms_total"]));
+      if (r["knob"] == "reference") seen.push_back({r["value"], r["patches"], r["bound"], r["error_max"]});
+    }
+    const std::string survey = make(hill_file(90, 80, 150, -120, 2.5), "survey.tif");
+    ASSERT_EQ(run({"import", database, survey, "--accuracy", "0.02", "--quiet"}).code, 0);
+  }
+  EXPECT_EQ(references[0].size(), 5u);
+  EXPECT_EQ(references[0], references[1]);
 }
 
 TEST_F(CostTest, LeavesAModelThatExplains) {

@@ -9,12 +9,6 @@
 
 namespace patchwork::cli {
 
-Spread Spread::of(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return {values.front(), (values[(n - 1) / 2] + values[n / 2]) / 2, values.back()};
-}
-
 WorkFolder::WorkFolder(const BenchOptions& options) : path_(options.keep), keep_(!options.keep.empty()) {
   if (keep_) {
     std::error_code failed;

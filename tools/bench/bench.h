@@ -1,4 +1,4 @@
-// What the benchmarks of `patchwork bench` share: works with their peers, spreads, a folder, test terrains.
+// What the benchmarks of `patchwork bench` share: works with their peers, a folder, test terrains.
 #pragma once
 
 #include <filesystem>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tools/cli.h"
+#include "tools/spread.h"
 #include "tools/unfinished_files.h"
 
 namespace patchwork::cli {
@@ -19,11 +20,6 @@ struct BenchOptions {
   int seconds = 60;  ///< that readers are kept busy
   std::string file;  ///< of heights for `codec`, `blend` and `render`; empty: a made terrain
   std::string keep;  ///< folder to work in and to leave; empty: a temporary one
-};
-
-struct Spread {
-  double min = 0, median = 0, max = 0;
-  static Spread of(std::vector<double> values);  ///< REQUIRES: not empty
 };
 
 /// One figure of ours beside the peers' figures of the same run.

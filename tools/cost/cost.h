@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "query/cost_model.h"
-#include "tools/bench/bench.h"
 #include "tools/cli.h"
 #include "tools/cost/rounds.h"
+#include "tools/spread.h"
 
 namespace patchwork::cli {
 
@@ -66,11 +66,14 @@ struct CostReport {
   Extent extent;
   std::vector<CostRow> rows;
   std::vector<std::string> notes;
-  std::size_t knee = 0;  ///< place in rows
+  std::optional<std::size_t> knee;  ///< place in rows; none where a larger error buys no time
   std::vector<Bargain> bargains;
   std::vector<std::string> bought;  ///< columns of the table of bargains, in order
   CostModel model;
   double r_squared = 0, worst_ratio = 1;  ///< of predictions of rows that the model was not made from
+  /// Milliseconds: the geometric mean of the medians of the settings over the reference (reference.h). Times
+  /// of two runs compare by their ratio to it: a machine is not equally fast at all times.
+  double reference() const;
   std::size_t beyond() const;
   std::vector<std::size_t> of(const std::string& knob) const;  ///< places in rows
 };

@@ -29,7 +29,7 @@ void put_stage(Json& j, const std::string& name, const std::vector<double>& ms) 
 }
 
 // Keys in the order of the CSV's columns: first those that programs rely on.
-Json json_of(const CostRow& r) {
+Json json_of(const CostRow& r, double reference) {
   Json j{{"knob", r.knob},           {"value", r.value},         {"error_asked", number(r.asked)},
          {"bound", number(r.bound)}, {"error_max", r.error.max}, {"error_p99", r.error.p99},
          {"error_rms", r.error.rms}, {"patches", r.patches},     {"bytes", r.bytes}};
@@ -41,6 +41,7 @@ Json json_of(const CostRow& r) {
   for (const char* stage : {"query", "fetch", "blend", "tessellate", "draw", "light", "total"})
     j[std::string("ms_") + stage] = spreads[std::string("ms_") + stage];
   j["bound_p99"] = r.bound ? Json(r.bound_p99) : Json();
+  j["of_reference"] = median(r.ms.total()) / reference;
   j["unit"] = r.unit, j["samples"] = r.samples, j["file_bytes"] = r.file_bytes;
   j["runs"] = r.ms.total().size();
   j["predicted_ms"] = number(r.predicted), j["fitted"] = r.fitted, j["beyond"] = r.beyond;
@@ -78,7 +79,7 @@ std::string figure(double v) {
 std::vector<std::string> write_cost(const CostReport& report, const std::string& folder) {
   const std::filesystem::path to(folder);
   Json rows = Json::array();
-  for (const CostRow& r : report.rows) rows.push_back(json_of(r));
+  for (const CostRow& r : report.rows) rows.push_back(json_of(r, report.reference()));
   write_file(to / "cost.json", rows.dump(2) + "\n");
   write_file(to / "cost.csv", csv_of(rows));
   std::vector<std::string> names{"cost.csv", "cost.json"};

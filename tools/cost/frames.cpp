@@ -120,6 +120,10 @@ class Frames {
   Blend best_;
 };
 
+Measurable measurable(const std::shared_ptr<const Frames>& frames, const FrameKnob& k) {
+  return {frames->facts(k), [frames, k](Stages& ms) { frames->once(k, ms); }};
+}
+
 }  // namespace
 
 FrameScene frame_scene(const Database& db, const Extent& e, const std::string& file, std::uint64_t memory) {
@@ -142,9 +146,14 @@ std::vector<Measurable> frame_settings(const Database& db, std::shared_ptr<Devic
                                        const FrameScene& scene) {
   const auto frames = std::make_shared<const Frames>(db, std::move(device), scene);
   std::vector<Measurable> all;
-  for (const FrameKnob& k : all_knobs())
-    all.push_back({frames->facts(k), [frames, k](Stages& ms) { frames->once(k, ms); }});
+  for (const FrameKnob& k : all_knobs()) all.push_back(measurable(frames, k));
   return all;
+}
+
+Measurable frame_setting(const Database& db, std::shared_ptr<Device> device, const FrameScene& scene,
+                         const std::string& knob, double pixel_error) {
+  return measurable(std::make_shared<const Frames>(db, std::move(device), scene),
+                    {knob, fmt::format("frame, {:g} px", pixel_error), pixel_error});
 }
 
 }  // namespace patchwork::cli

@@ -23,5 +23,8 @@ FrameScene frame_scene(const Database& db, const Extent& extent, const std::stri
 /// best surface through each pixel's depth. Refers to `db`. Throws Error: a device that does not draw.
 std::vector<Measurable> frame_settings(const Database& db, std::shared_ptr<Device> device,
                                        const FrameScene& scene);
+/// One of them, at a pixel error.
+Measurable frame_setting(const Database& db, std::shared_ptr<Device> device, const FrameScene& scene,
+                         const std::string& knob, double pixel_error);
 
 }  // namespace patchwork::cli

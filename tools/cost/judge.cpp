@@ -11,6 +11,7 @@ namespace patchwork::cli {
 namespace {
 
 constexpr double kTimes[] = {1, 5, 16, 33};  // milliseconds
+constexpr double kFall = 1.25;               // of time from end to end: what is less has no knee
 
 // A column of the table of bargains: which rows, and what of their time.
 struct Column {
@@ -38,6 +39,12 @@ std::size_t CostReport::beyond() const {
   return n;
 }
 
+double CostReport::reference() const {
+  double logs = 0, n = 0;
+  for (const std::size_t k : of("reference")) logs += std::log(median(rows[k].ms.total())), ++n;
+  return std::exp(logs / n);
+}
+
 std::vector<std::size_t> CostReport::of(const std::string& knob) const {
   std::vector<std::size_t> places;
   for (std::size_t k = 0; k < rows.size(); ++k)
@@ -45,18 +52,20 @@ std::vector<std::size_t> CostReport::of(const std::string& knob) const {
   return places;
 }
 
-// On logarithmic axes, scaled to the unit square, the point farthest from the chord between the ends.
+// On logarithmic axes, scaled to the unit square, the point farthest below the chord between the ends.
 void find_knee(CostReport& report) {
-  std::vector<std::size_t> steps = report.of("error");
+  report.knee.reset();
+  const std::vector<std::size_t> steps = report.of("error");
+  if (steps.empty()) return;
   const auto x = [&](std::size_t k) { return std::log(std::max(*report.rows[k].bound, 1e-9)); };
   const auto y = [&](std::size_t k) { return std::log(median(report.rows[k].ms.total())); };
   const std::size_t first = steps.front(), last = steps.back();
+  if (y(first) - y(last) < std::log(kFall)) return;
   double farthest = 0;
-  report.knee = first;
   for (const std::size_t k : steps) {
     const double along = (x(k) - x(first)) / std::max(1e-12, x(last) - x(first)),
                  down = (y(first) - y(k)) / std::max(1e-12, y(first) - y(last));
-    if (std::abs(down - along) > farthest) farthest = std::abs(down - along), report.knee = k;
+    if (down - along > farthest) farthest = down - along, report.knee = k;
   }
 }
 

@@ -1,15 +1,19 @@
 // The knobs of `patchwork cost`, one at a time.
 #include <fmt/format.h>
+#include <malloc.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "blend/vulkan/vulkan_blend.h"
 #include "db/error.h"
+#include "tools/bench/bench.h"
 #include "tools/cost/check_points.h"
 #include "tools/cost/frames.h"
+#include "tools/cost/reference.h"
 #include "tools/cost/uniform_grid.h"
 #include "tools/resampler.h"
 #include "tools/sample_dataset.h"
@@ -20,14 +24,22 @@ namespace {
 
 constexpr double kGathering = 0.3;   // about this part of the work is done before times are taken
 constexpr int kAboutSettings = 160;  // uniform grids included
-constexpr double kVisit = 0.01;      // seconds that a setting is run again for
+constexpr double kVisit = 0.05;      // seconds that a setting is run again for
 constexpr int kMostOfAVisit = 8;
+constexpr int kReferenceSide = 512, kReferencePoints = 4096;
 constexpr int kSteps = 15;  // of the ladder of errors, 0 among them
 constexpr int kMiddle = 7;  // the step at which the other knobs are turned
 constexpr double kPixelErrors[] = {0.5, 1, 2, 4, 8, 16, 32, 50};
 constexpr double kTolerances[] = {0, 0.01, 0.1, 1};  // metres
 constexpr int kTiles[] = {17, 33, 65, 129};          // vertices along each side
 constexpr std::size_t kMostSamples = 100'000'000;    // that are stored again for the tolerances
+
+// Memory that is given back is not returned to the system: each run begins from nothing, and what it then
+// costs to be given zeroed pages again depends on the machine's other tenants more than on the setting.
+void keep_freed_memory() {
+  mallopt(M_MMAP_MAX, 0);
+  mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
+}
 
 // One setting of one knob, ready to be measured.
 struct Setting {
@@ -37,6 +49,7 @@ struct Setting {
   Extent window{};
   std::span<const double> scale{};  // see CheckPoints::compare
   const Database* db = nullptr;
+  const CheckPoints* points = nullptr;
   BlendOptions blend{};
   bool vulkan = false, comparable = true;
   int tile = 64, side = 0, threads = 0;
@@ -73,7 +86,7 @@ class Bench {
                       grid_->step(), UniformGrid::kMostSide));
     for (const int side : {o_.side, o_.side / 2, o_.side / 8}) errors(side);
     pixel_errors(), blends(), engines(), sides(), thread_counts();
-    uniform_grid(), frames(), tolerances();
+    uniform_grid(), frames(), tolerances(), reference();
     const auto until = start_ + std::chrono::round<std::chrono::steady_clock::duration>(
                                     std::chrono::duration<double>(o_.seconds));
     std::vector<MeasuredRun> runs;
@@ -166,6 +179,7 @@ class Bench {
             .cut = make_surface(uniform(error)),
             .window = extent_,
             .db = &db_,
+            .points = points_.get(),
             .side = o_.side,
             .threads = threads()};
   }
@@ -192,7 +206,7 @@ class Bench {
     row.patches = x.patches.size(), row.bytes = x.cost.bytes, row.file_bytes = s.db->file_bytes();
     row.samples = double(s.side) * s.side;
     if (s.comparable) row.found = x.cost, row.expected = expect(*s.db, *s.cut, {});
-    points_->compare(*evaluator(s, *s.db, x), s.scale, s.vulkan, row);
+    s.points->compare(*evaluator(s, *s.db, x), s.scale, s.vulkan, row);
     return row;
   }
 
@@ -243,6 +257,7 @@ class Bench {
     try {
       const FrameScene scene = frame_scene(db_, extent_, o_.scene, common_.memory);
       for (Measurable& m : frame_settings(db_, device_, scene)) all_.push_back(std::move(m));
+      frames_drawn_ = true;
     } catch (const Error& e) {
       report_.notes.push_back(fmt::format("no frame was drawn: {}", e.what()));
     }
@@ -369,6 +384,27 @@ class Bench {
     return Database::open(path, memory_);
   }
 
+  // How fast the machine was meanwhile: the same terrain in every run of every database.
+  void reference() {
+    reference_ = make_reference(folder_.path(""), memory_);
+    const Extent e = reference_->extent();
+    reference_points_ = std::make_unique<CheckPoints>(*reference_, e, kReferencePoints);
+    std::vector<Setting> all;
+    const auto add_one = [&](const std::string& value, double error, bool vulkan) {
+      Setting s = setting("reference", value, error);
+      s.cut = make_surface(UniformCut{.error = error, .region = Region::inside(e)});
+      s.window = e, s.db = &*reference_, s.points = reference_points_.get(), s.side = kReferenceSide;
+      s.vulkan = vulkan, s.comparable = false;
+      all.push_back(std::move(s));
+    };
+    for (const double error : kReferenceErrors) add_one(fmt::format("{:g} m", error), error, false);
+    if (device_) add_one("vulkan", kReferenceErrors[1], true);
+    add(all);
+    if (frames_drawn_)
+      all_.push_back(frame_setting(*reference_, device_, frame_scene(*reference_, e, "", common_.memory),
+                                   "reference", 2));
+  }
+
   // Rows of the uniform grid: each level over each window at each side that the knobs have.
   void uniform_grid() {
     std::vector<int> sides;
@@ -401,6 +437,9 @@ class Bench {
   std::shared_ptr<Device> device_;
   std::vector<double> ladder_, scale_;
   std::vector<Database> stored_;  // again, to within the tolerances
+  std::optional<Database> reference_;
+  std::unique_ptr<CheckPoints> reference_points_;
+  bool frames_drawn_ = false;
   std::vector<Measurable> all_;
   CostReport report_;
 };
@@ -408,6 +447,7 @@ class Bench {
 }  // namespace
 
 CostReport measure_cost(const CostOptions& options, const Common& common) {
+  keep_freed_memory();
   CostReport report = Bench(options, common).run();
   find_knee(report), find_bargains(report), fit_model(report);
   return report;

@@ -30,13 +30,10 @@ struct Section {
 constexpr Section kSections[] = {
     {"price", "Time against error",
      "Each step of the ladder three times: at the error that it guarantees, at the largest that was "
-     "measured, "
-     "and at the one that 99 % of the points keep. Bars reach from the fastest to the slowest run. The knee "
-     "is "
-     "the step farthest from the straight line between the ends: on one side of it less error costs little, "
-     "on "
-     "the other much. Time is that of finding the patches, reading them from the file and evaluating the "
-     "picture."},
+     "measured, and at the one that 99 % of the points keep. Bars reach from the fastest to the slowest run "
+     "that counts. The knee is the step farthest below the straight line between the ends: on one side of "
+     "it less error costs little, on the other much; where time falls by less than a fifth there is none. "
+     "Time is that of finding the patches, reading them from the file and evaluating the picture."},
     {"stages", "Where the time goes",
      "The same steps in order, stage by stage, with nothing in memory but what the operating system keeps of "
      "the file. The uniform grid stands beside each step with its coarsest level that is as close to the "
@@ -144,11 +141,13 @@ std::string cost_page(const CostReport& c, const std::vector<std::pair<std::stri
   std::string page = kHead;
   page += "<h1>What accuracy costs in time</h1>\n";
   page += fmt::format(
-      "<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of the fastest quarter of {} runs or "
-      "more: what slows others is whatever else the machine does.</p>\n",
+      "<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of {} runs or more. A machine is not "
+      "equally fast at all times: beside them settings over generated terrain, the same in every report, "
+      "took "
+      "{} ms (reference); times of two reports compare by their ratio to it.</p>\n",
       c.side, c.side, figure((c.extent.xmax - c.extent.xmin) / 1e3),
       figure((c.extent.ymax - c.extent.ymin) / 1e3), escaped(c.machine), c.threads,
-      c.engine.empty() ? "" : ", graphics card " + escaped(c.engine), c.runs);
+      c.engine.empty() ? "" : ", graphics card " + escaped(c.engine), c.runs, figure(c.reference()));
   page += verdict(c);
   for (const std::string& n : c.notes) page += "<p>Note: " + escaped(n) + ".</p>\n";
   page +=

@@ -103,11 +103,14 @@ void price(Script& s, const CostReport& c) {
   s.block("guaranteed", lines(c, "error", guaranteed)), s.block("largest", lines(c, "error", largest));
   s.block("p99", lines(c, "error", p99));
   s.block("uniform", lines(c, fmt::format("uniform_{}", c.side), largest));
-  const CostRow& knee = c.rows[c.knee];
-  s.block("knee", {fmt::format("{} {}", guaranteed(knee), median(knee.ms.total()))});
-  s.picture("price", axes("error, metres", "time, ms", "xy"),
-            fmt::format("plot {}, $knee w p ls 6 t 'knee: {} m, {} ms'", kCurve, figure(guaranteed(knee)),
-                        figure(median(knee.ms.total()))));
+  std::string plot = fmt::format("plot {}", kCurve);
+  if (c.knee) {
+    const CostRow& knee = c.rows[*c.knee];
+    const double ms = median(knee.ms.total());
+    s.block("knee", {fmt::format("{} {}", guaranteed(knee), ms)});
+    plot += fmt::format(", $knee w p ls 6 t 'knee: {} m, {} ms'", figure(guaranteed(knee)), figure(ms));
+  }
+  s.picture("price", axes("error, metres", "time, ms", "xy"), plot);
 }
 
 void pixels(Script& s, const CostReport& c) {

@@ -23,24 +23,25 @@ std::vector<double> sum(std::initializer_list<const std::vector<double>*> parts)
 }
 
 // The runs that count, fastest first.
-std::vector<std::size_t> fastest(const Stages& ms) {
+std::vector<std::size_t> middle_half(const Stages& ms) {
   const std::vector<double> total = ms.total();
   std::vector<std::size_t> runs(total.size());
   std::iota(runs.begin(), runs.end(), std::size_t{0});
   std::stable_sort(runs.begin(), runs.end(),
                    [&](std::size_t a, std::size_t b) { return total[a] < total[b]; });
-  runs.resize(std::min(runs.size(), std::max(kLeastThatCount, (runs.size() + 3) / 4)));
-  return runs;
+  const std::size_t spare = runs.size() - std::min(runs.size(), kLeastThatCount);
+  const auto off = std::ptrdiff_t(std::min(runs.size() / 4, spare / 2));  // each end
+  return {runs.begin() + off, runs.end() - off};
 }
 
 bool sure(const Stages& ms) {
   const std::vector<double> total = ms.total();
-  const std::vector<std::size_t> runs = fastest(ms);
+  const std::vector<std::size_t> runs = middle_half(ms);
   return total[runs.back()] <= (1 + kSure) * total[runs.front()];
 }
 
-void keep_fastest(Stages& ms) {
-  const std::vector<std::size_t> runs = fastest(ms);
+void keep_middle_half(Stages& ms) {
+  const std::vector<std::size_t> runs = middle_half(ms);
   for (std::vector<double>* stage : {&ms.query, &ms.fetch, &ms.blend, &ms.tessellate, &ms.draw, &ms.light}) {
     if (stage->empty()) continue;
     std::vector<double> kept;
@@ -77,7 +78,7 @@ std::vector<Stages> measure(std::span<const MeasuredRun> all, const Rounds& roun
     }
     longest = std::max(longest, Clock::now() - now);
   }
-  for (Stages& ms : times) keep_fastest(ms);
+  for (Stages& ms : times) keep_middle_half(ms);
   return times;
 }
 

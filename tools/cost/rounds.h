@@ -25,9 +25,10 @@ struct Rounds {
 };
 
 /// Runs each in turn, A B C A B C: `least` times, and on until what counts of each is known to kSure of
-/// itself, the time has come, or kMostRuns were made. Of each, the fastest quarter of its runs counts and is
-/// given out, three at least: what else runs on a machine, and what shares its caches and memory, only ever
-/// adds time, as much as 1.4 times for seconds or minutes.
+/// itself, the time has come, or kMostRuns were made. Of each, the middle half of its runs counts and is
+/// given out, three at least: a machine that others use too has faster and slower minutes, which all settings
+/// meet alike. So medians keep to each other's proportions, where what was fastest depends on who met the
+/// best moment.
 std::vector<Stages> measure(std::span<const MeasuredRun> all, const Rounds& rounds);
 inline constexpr double kSure = 0.02;  ///< between the fastest and the slowest that count
 inline constexpr int kMostRuns = 100;

@@ -12,7 +12,6 @@ namespace patchwork::cli {
 namespace {
 
 Json json_of(const CostReport& c, const std::vector<std::string>& files) {
-  const CostRow& knee = c.rows[c.knee];
   Json j{{"rows", c.rows.size()},
          {"points", c.points},
          {"beyond", c.beyond()},
@@ -20,9 +19,14 @@ Json json_of(const CostReport& c, const std::vector<std::string>& files) {
          {"notes", c.notes},
          {"machine", c.machine},
          {"content_hash", c.content_hash},
-         {"knee", {{"error", *knee.asked}, {"bound", *knee.bound}, {"ms", median(knee.ms.total())}}},
+         {"reference_ms", c.reference()},
+         {"knee", {}},
          {"model", {{"r_squared", c.r_squared}, {"worst_ratio", c.worst_ratio}}},
          {"budgets", Json::array()}};
+  if (c.knee) {
+    const CostRow& r = c.rows[*c.knee];
+    j["knee"] = {{"error", *r.asked}, {"bound", *r.bound}, {"ms", median(r.ms.total())}};
+  }
   for (const Bargain& b : c.bargains) {
     Json one{{"ms", b.ms},  {"what", b.what},  {"error", {}},
              {"bound", {}}, {"error_max", {}}, {"patches", {}}};
@@ -37,10 +41,12 @@ Json json_of(const CostReport& c, const std::vector<std::string>& files) {
 }
 
 void print_text(const CostReport& c, const std::string& folder) {
-  const CostRow& knee = c.rows[c.knee];
-  fmt::print(
-      "{} settings; the knee is at an error of {} m ({} ms); the model explains {:.1f} % of the time\n",
-      c.rows.size(), figure(*knee.bound), figure(median(knee.ms.total())), 100 * c.r_squared);
+  const auto at = [](const CostRow& r) {
+    return fmt::format("the knee is at an error of {} m ({} ms)", figure(*r.bound),
+                       figure(median(r.ms.total())));
+  };
+  fmt::print("{} settings; {}; the model explains {:.1f} % of the time\n", c.rows.size(),
+             c.knee ? at(c.rows[*c.knee]) : "no knee: larger errors take about as long", 100 * c.r_squared);
   for (const Bargain& b : c.bargains)
     fmt::print("  {:>2g} ms, {}: {}\n", b.ms, b.what,
                b.row ? fmt::format("within {} m (measured {} m)", figure(*c.rows[*b.row].bound),
@@ -91,9 +97,7 @@ void add_cost(CLI::App& app, Common& common) {
   v->add_option("--size", o->side, "heights along each side of the picture")
       ->check(CLI::Range(64, 4096))
       ->capture_default_str();
-  v->add_option(
-       "--runs", o->runs,
-       "measured runs of each setting, at least; the fastest quarter counts: others tell of the machine")
+  v->add_option("--runs", o->runs, "measured runs of each setting, at least; medians are of all of them")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
   v->add_option("--seconds", o->seconds, "up to which runs are added until the medians are sure")

@@ -201,7 +201,12 @@ class Importer {
     for (int j = 0; j < c.rows; ++j) {
       const float* from = l.row(cy * kChunkVertices + j) + cx * kChunkVertices;
       std::int32_t* to = c.codes.data() + size_t(j) * size_t(c.cols);
-      for (int i = 0; i < c.cols; ++i) to[i] = std::int32_t(from[i]);
+      for (int i = 0; i < c.cols; ++i) {
+        // Where a cell of a coarse level is far longer than the grid is wide, what continues it may grow so.
+        if (!(std::abs(from[i]) < 0x1p31f))
+          throw Error(source_.path(), "it is too narrow for its length", "cut it into shorter pieces");
+        to[i] = std::int32_t(from[i]);
+      }
     }
     return c;
   }

@@ -1,5 +1,5 @@
 // What a grid's coming or going does to the others: tops and flags are evaluated anew where it lies, and the
-// R-tree and the store follow (used by import.cpp, remove.cpp and check.cpp).
+// R-tree and the store follow.
 #pragma once
 
 #include <string>

@@ -56,10 +56,10 @@ CostModel calibrate(const Database& db);
 /// The saved model, else a new one of finding alone.
 CostModel model_of(const Database& db);
 
+inline constexpr std::size_t kSampledLeaves = 64;
 /// Reads the inner pages that the cut meets and at most kSampledLeaves of the pages below them, evenly
 /// chosen, so `patches` and `bytes` are an estimate and exact where there are no more; `boxes` counts what
 /// would be compared.
-inline constexpr std::size_t kSampledLeaves = 64;
 Cost expect(const Database& db, const CutSurface& cut, const CostModel& model);
 
 /// The smallest error on a ladder of quarter octaves below `most` (and 0) whose expected time is at most nine

@@ -249,7 +249,7 @@ ViewCut over_terrain_of(const Database& db, ViewCut v) {
 }
 
 std::unique_ptr<CutSurface> make_surface(const UniformCut& cut) {
-  require(cut.error >= 0, "error", "it must be a number of metres, 0 or more");
+  require(is_error(cut.error), "error", "it must be a number of metres, 0 or more");
   return std::make_unique<UniformSurface>(cut);
 }
 

@@ -17,19 +17,58 @@ namespace bg = boost::geometry;
 using Vertex = bg::model::d2::point_xy<double>;
 using Polygon = bg::model::polygon<Vertex>;
 
-Polygon polygon_of(const std::vector<Point>& corners) {
+Polygon polygon_of(const Frame& frame, const LatticeRect& r) {
   Polygon p;
-  for (const Point& c : corners) bg::append(p.outer(), Vertex(c.x, c.y));
+  for (const Point c : {frame.to_domain(r.i0, r.j0), frame.to_domain(r.i1, r.j0), frame.to_domain(r.i1, r.j1),
+                        frame.to_domain(r.i0, r.j1)})
+    bg::append(p.outer(), Vertex(c.x, c.y));
   bg::correct(p);
   return p;
 }
 
-std::vector<Point> corners_of(const Frame& frame, const LatticeRect& r) {
-  return {frame.to_domain(r.i0, r.j0), frame.to_domain(r.i1, r.j0), frame.to_domain(r.i1, r.j1),
-          frame.to_domain(r.i0, r.j1)};
-}
+constexpr std::size_t kMostSlabs = 1024;
 
 }  // namespace
+
+// A polygon with its sides by slabs of y, so that a place meets few of them.
+struct Region::Outline {
+  struct Side {
+    Point a, b;
+    Extent bounds() const {
+      return {std::min(a.x, b.x), std::min(a.y, b.y), std::max(a.x, b.x), std::max(a.y, b.y)};
+    }
+  };
+  double ymin, slabs_a_metre;
+  std::vector<std::vector<Side>> slabs;
+
+  Outline(const std::vector<Point>& corners, const Extent& e)
+      : ymin(e.ymin), slabs(std::min(corners.size(), kMostSlabs)) {
+    slabs_a_metre = e.ymax > e.ymin ? double(slabs.size()) / (e.ymax - e.ymin) : 0;
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      const Side side{corners[k], corners[(k + 1) % corners.size()]};
+      for (std::size_t s = slab(side.bounds().ymin); s <= slab(side.bounds().ymax); ++s)
+        slabs[s].push_back(side);
+    }
+  }
+
+  std::size_t slab(double y) const {
+    return std::size_t(std::clamp((y - ymin) * slabs_a_metre, 0.0, double(slabs.size() - 1)));
+  }
+  bool contains(Point p) const {
+    bool inside = false;
+    for (const auto& [a, b] : slabs[slab(p.y)])  // sides to the right of it: an odd number
+      if ((a.y > p.y) != (b.y > p.y)) inside ^= p.x < a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y));
+    return inside;
+  }
+  bool crosses(const Polygon& patch, const Extent& around) const {
+    for (std::size_t s = slab(around.ymin); s <= slab(around.ymax); ++s)
+      for (const Side& side : slabs[s])
+        if (side.bounds().meets(around) &&
+            bg::intersects(bg::model::segment<Vertex>({side.a.x, side.a.y}, {side.b.x, side.b.y}), patch))
+          return true;
+    return false;
+  }
+};
 
 Region Region::inside(const Extent& e) {
   if (!(e.xmin <= e.xmax && e.ymin <= e.ymax) || !std::isfinite(e.xmax - e.xmin) ||
@@ -40,7 +79,7 @@ Region Region::inside(const Extent& e) {
   return r;
 }
 
-Region Region::inside(std::vector<Point> corners) {
+Region Region::inside(const std::vector<Point>& corners) {
   if (corners.size() < 3) throw Error("polygon", "it needs at least three corners");
   Region r;
   r.bounds_ = {INFINITY, INFINITY, -INFINITY, -INFINITY};
@@ -49,7 +88,7 @@ Region Region::inside(std::vector<Point> corners) {
     r.bounds_ = {std::min(r.bounds_.xmin, p.x), std::min(r.bounds_.ymin, p.y), std::max(r.bounds_.xmax, p.x),
                  std::max(r.bounds_.ymax, p.y)};
   }
-  r.corners_ = std::move(corners);
+  r.outline_ = std::make_shared<const Outline>(corners, r.bounds_);
   return r;
 }
 
@@ -58,38 +97,37 @@ std::vector<Point> parse_points(const std::string& what, const std::string& text
   const std::size_t open = numbers.find_last_of('('), close = numbers.find(')');
   if (open != std::string::npos && close != std::string::npos && open < close)
     numbers = numbers.substr(open + 1, close - open - 1);
-  std::replace(numbers.begin(), numbers.end(), ',', ' ');
-  std::istringstream in(numbers);
   std::vector<Point> corners;
-  bool paired = true;
-  for (Point p; in >> p.x;) {
-    paired = bool(in >> p.y);
-    if (paired) corners.push_back(p);
+  std::size_t has = 0;  // numbers of each point: a height of WKT's does not matter
+  std::istringstream points(numbers);
+  bool good = true;
+  for (std::string one; good && std::getline(points, one, ',');) {
+    std::istringstream in(one);
+    std::vector<double> v;
+    for (double number; in >> number;) v.push_back(number);
+    good = in.eof() && (v.size() == 2 || v.size() == 3) && (has == 0 || v.size() == has);
+    has = v.size();
+    if (good) corners.push_back({v[0], v[1]});
   }
-  if (!in.eof() || !paired)
-    throw Error(what, "cannot read \"" + text + "\"", "write it as \"x y, x y, x y\"");
+  if (!good) throw Error(what, "cannot read \"" + text + "\"", "write it as \"x y, x y, x y\"");
   return corners;
 }
 
 Region Region::parse_polygon(const std::string& text) { return inside(parse_points("polygon", text)); }
 
-bool Region::contains(Point p) const {
-  if (!bounds_.contains(p)) return false;
-  bool inside = corners_.empty();
-  for (std::size_t k = 0; k < corners_.size(); ++k) {  // sides to the right of it: an odd number
-    const Point &a = corners_[k], &b = corners_[(k + 1) % corners_.size()];
-    if ((a.y > p.y) != (b.y > p.y)) inside ^= p.x < a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y));
-  }
-  return inside;
-}
+bool Region::contains(Point p) const { return bounds_.contains(p) && (!outline_ || outline_->contains(p)); }
 
 bool Region::meets(const Grid& grid, const GridShape::Block& b) const {
   const LatticeRect domain = grid.info.shape.domain(b.level, b.bx, b.by);
-  if (!grid.info.frame.bounds(domain).meets(bounds_)) return false;
+  const Extent around = grid.info.frame.bounds(domain);
+  if (!around.meets(bounds_)) return false;
   const bool rotated = grid.info.frame.numbers()[2] != 0 || grid.info.frame.numbers()[4] != 0;
-  if (corners_.empty() && (!rotated || bounds_.xmin < -1e299)) return true;
-  const Polygon patch = polygon_of(corners_of(grid.info.frame, domain));
-  if (!corners_.empty()) return bg::intersects(patch, polygon_of(corners_));
+  if (!outline_ && (!rotated || bounds_.xmin < -1e299)) return true;
+  const Polygon patch = polygon_of(grid.info.frame, domain);
+  // A polygon without a side in the patch holds all of it, or nothing.
+  if (outline_)
+    return outline_->crosses(patch, around) ||
+           outline_->contains(grid.info.frame.to_domain(domain.i0, domain.j0));
   return bg::intersects(patch,
                         bg::model::box<Vertex>({bounds_.xmin, bounds_.ymin}, {bounds_.xmax, bounds_.ymax}));
 }

@@ -1,7 +1,7 @@
 // Where a question is asked: everywhere, in an upright rectangle, or in a polygon.
 #pragma once
 
-#include <optional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,7 +15,7 @@ class Region {
   Region() = default;  ///< everywhere
   static Region inside(const Extent& extent);
   /// A simple polygon by its corners, in either turn. Throws Error: fewer than three corners, not finite.
-  static Region inside(std::vector<Point> corners);
+  static Region inside(const std::vector<Point>& corners);
   /// Reads "x y, x y, ..." or "POLYGON((x y, ...))". Throws Error.
   static Region parse_polygon(const std::string& text);
 
@@ -25,8 +25,9 @@ class Region {
   bool meets(const Grid& grid, const GridShape::Block& block) const;
 
  private:
+  struct Outline;
   Extent bounds_{-1e300, -1e300, 1e300, 1e300};
-  std::vector<Point> corners_;  // of a polygon; empty for a rectangle
+  std::shared_ptr<const Outline> outline_;  // of a polygon; none for a rectangle
 };
 
 /// Reads "x y, x y, ..." or WKT of one ring or line. Throws Error(what, ...).

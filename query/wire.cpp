@@ -156,7 +156,8 @@ Update::Source get_source(Reader& r) {
   for (double& v : n) v = r.metres();
   if (n[1] * n[5] == n[2] * n[4]) refuse("a frame of it has no area");
   s.frame = Frame::from_trusted(n);
-  const std::uint32_t width = r.at_most(1u << 24), height = r.at_most(1u << 24), area = r.at_most(1);
+  const std::uint32_t width = r.at_most(GridShape::kMostSamples), height = r.at_most(GridShape::kMostSamples),
+                      area = r.at_most(1);
   if (width < 2 || height < 2) refuse("a grid of it has no cells");
   s.shape = GridShape(int(width), int(height), area != 0);
   s.quantum = r.metres(), s.base = r.metres(), s.rim_error = r.error();

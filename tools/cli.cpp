@@ -50,14 +50,16 @@ void ProgressBar::show(double share) {
 
 CLI::Validator above_zero() {
   return {[](const std::string& s) {
-            return std::strtod(s.c_str(), nullptr) > 0 ? "" : std::string("it must be above 0");
+            const double v = std::strtod(s.c_str(), nullptr);
+            return v > 0 && std::isfinite(v) ? "" : std::string("it must be a number above 0");
           },
           "above 0"};
 }
 
 CLI::Validator zero_or_more() {
   return {[](const std::string& s) {
-            return std::strtod(s.c_str(), nullptr) >= 0 ? "" : std::string("it must be 0 or more");
+            const double v = std::strtod(s.c_str(), nullptr);
+            return v >= 0 && std::isfinite(v) ? "" : std::string("it must be a number, 0 or more");
           },
           "0 or more"};
 }

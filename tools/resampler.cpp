@@ -13,6 +13,7 @@ namespace patchwork::cli {
 
 namespace {
 constexpr int kStrip = 256, kStrips = 32;  // rows at least, and about how often progress is told
+constexpr double kHalfUlp = 0x1p-24;       // at most, of a number in float32
 }  // namespace
 
 Raster Raster::covering(const Extent& e, double step) {
@@ -30,10 +31,13 @@ RasterFrame Raster::frame(int factor) const {
   return {xmin + 0.5 * step, s, 0, ymax - 0.5 * step, 0, -s};
 }
 
-double finest_step(const Database& db, const Extent& extent) {
+double finest_step(const Database& db, const Extent& extent, std::span<const GridId> among) {
   double finest = INFINITY;
+  const auto counts = [&](GridId id) {
+    return among.empty() || std::find(among.begin(), among.end(), id) != among.end();
+  };
   for (const Grid& g : db.grids())
-    if (g.info.frame.bounds(g.info.shape.footprint()).meets(extent))
+    if (counts(g.info.id) && g.info.frame.bounds(g.info.shape.footprint()).meets(extent))
       finest = std::min({finest, g.info.frame.step_i(), g.info.frame.step_j()});
   if (!std::isfinite(finest))
     throw Error(db.path(), "no grid meets the extent", "see its extent with: patchwork info");
@@ -99,11 +103,13 @@ void Resampler::evaluate(int factor, int row, int rows, std::span<float* const> 
         std::copy(out.height32.begin() + long(from), out.height32.begin() + long(to), f + from);
       if (bands_[b] == "source")
         for (std::size_t k = from; k < to; ++k) f[k] = source_[k] ? float(source_[k]) : NAN;
-      // A bound is rounded up, or it would not be one.
+      // A bound is rounded up, or it would not be one, and counts how its height was rounded.
       if (bands_[b] == "bound")
         for (std::size_t k = from; k < to; ++k) {
-          const float e = float(bound_[k]);
-          f[k] = double(e) < bound_[k] ? std::nextafterf(e, INFINITY) : e;
+          const double rounding = out.height32.empty() ? 0 : kHalfUlp * std::abs(double(out.height32[k]));
+          const double bound = bound_[k] + rounding;
+          const float e = float(bound);
+          f[k] = double(e) < bound ? std::nextafterf(e, INFINITY) : e;
         }
     });
   }

@@ -21,20 +21,24 @@ struct Raster {
   /// The pixels of `step` that cover `extent`. Throws Error: a step that is not above 0, more than 2^31
   /// pixels a side.
   static Raster covering(const Extent& extent, double step);
+  /// Of its pixels, which may reach beyond the extent that they cover.
+  Extent extent() const { return {xmin, ymax - height * step, xmin + width * step, ymax}; }
   /// Pixel centres; those of an overview are every factor-th of this raster's, so that its heights keep their
   /// bounds.
   RasterFrame frame(int factor = 1) const;
 };
 
-/// The finest step of the grids that meet an extent, metres: what `--step` is where it is not given.
-double finest_step(const Database& db, const Extent& extent);
+/// The finest step of the grids that meet an extent, metres: what `--step` is where it is not given. `among`:
+/// the grids that count; empty: all.
+double finest_step(const Database& db, const Extent& extent, std::span<const GridId> among = {});
 
 struct ResampleTally {
   BlendCounts full;          ///< of the full resolution
   double blend_seconds = 0;  ///< overviews included
 };
 
-/// Fills rows of the bands named (height, bound, source) as float32, NaN (source: 0) where there is no data.
+/// Fills rows of the bands named (height, bound, source) as float32, NaN where there is no data. A bound
+/// holds for the float32 height beside it.
 class Resampler {
  public:
   /// Evaluates all at once, and tells its progress, if the raster fits into a quarter of `memory` (bytes),

@@ -18,7 +18,7 @@ constexpr int kRows = 256;
 
 struct Range {
   double low = INFINITY, high = -INFINITY;
-  bool holes = false;
+  bool holes = false, nodata = false;  // nodata: some sample has the value that meant no data in the file
 };
 
 class SampleWriter {
@@ -57,6 +57,8 @@ class SampleWriter {
         range_.holes = true;
       else
         range_.low = std::min(range_.low, v), range_.high = std::max(range_.high, v);
+      range_.nodata |=
+          grid_.nodata && float(v) == float(*grid_.nodata);  // a sample is where it was rounded to
     }
   }
 
@@ -66,7 +68,7 @@ class SampleWriter {
     if (type_ == GDT_Unknown || (grid_.quantisation > 0 && GDALDataTypeIsInteger(type_))) type_ = GDT_Float64;
     if (type_ == GDT_Byte && range_.low < 0) type_ = GDT_Int16;
     if (!range_.holes) return;
-    nodata_ = grid_.nodata;
+    if (!range_.nodata) nodata_ = grid_.nodata;
     if (nodata_) return;
     if (!GDALDataTypeIsInteger(type_)) {
       nodata_ = std::numeric_limits<double>::quiet_NaN();
@@ -81,15 +83,13 @@ class SampleWriter {
   }
 
   void fill(const std::string& path, const std::string& name) {
-    char** options = nullptr;
-    options = CSLSetNameValue(options, "TILED", "YES");
-    options = CSLSetNameValue(options, "COMPRESS", "DEFLATE");
-    options = CSLSetNameValue(options, "PREDICTOR", GDALDataTypeIsInteger(type_) ? "2" : "3");
-    options = CSLSetNameValue(options, "BIGTIFF", "IF_SAFER");
-    CPLPushErrorHandler(CPLQuietErrorHandler);
+    CPLStringList options;
+    options.SetNameValue("TILED", "YES").SetNameValue("COMPRESS", "DEFLATE");
+    options.SetNameValue("PREDICTOR", GDALDataTypeIsInteger(type_) ? "2" : "3");
+    options.SetNameValue("BIGTIFF", "IF_SAFER");
+    const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
     GDALDatasetUniquePtr out(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
-        name.c_str(), width(), height(), 1, type_, options));
-    CSLDestroy(options);
+        name.c_str(), width(), height(), 1, type_, options.List()));
     bool good = out != nullptr;
     if (good) {
       describe(*out);
@@ -106,7 +106,6 @@ class SampleWriter {
       out.reset();  // writes the last blocks: what fails is only told as an error
       good = good && CPLGetLastErrorType() < CE_Failure;
     }
-    CPLPopErrorHandler();
     if (!good) throw Error(path, std::string("it cannot be written: ") + CPLGetLastErrorMsg());
   }
 

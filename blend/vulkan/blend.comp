@@ -101,12 +101,6 @@ void compose(inout Point q, Patch p) {
   q.steep = q.steep || (kMode == kHoles && p.steep);
 }
 
-// Neighbours share these vertices and must give them the same bits.
-bool on_exact_rim(Point q, Tile tile) {
-  return push.exact_rim != 0 && (q.at.x == 0 || q.at.y == 0 || int(q.at.x) == tile.across - 1 ||
-                                 int(q.at.y) == tile.down - 1);
-}
-
 // Their order does not matter: each is evaluated by itself.
 void postpone(uint at) {
   const uint n = atomicAdd(tally.later_count, 1);
@@ -118,10 +112,10 @@ void postpone(uint at) {
 struct Counted { uint reads, most; float bound; };
 
 // Vertices of the tile that nobody asked for have no data.
-void write(Point q, uint t, Tile tile, Answer a, uint reads, bool uncertain, inout Counted n) {
+void write(Point q, uint t, Answer a, uint reads, bool uncertain, inout Counted n) {
   if (q.at.x >= push.side || q.at.y >= push.side) return;
   const uint at = (t * push.side + uint(q.at.y)) * push.side + uint(q.at.x);
-  const bool later = q.wanted && (uncertain || on_exact_rim(q, tile)), any = q.wanted && !later && reads > 0;
+  const bool later = q.wanted && uncertain, any = q.wanted && !later && reads > 0;
   put(at, a, any);
   if (later) postpone(at);
   if (!any) return;
@@ -129,14 +123,14 @@ void write(Point q, uint t, Tile tile, Answer a, uint reads, bool uncertain, ino
   if (a.bound <= push.strict_error) n.bound = max(n.bound, a.bound);
 }
 
-void copy(Point q, Patch p, uint t, Tile tile, inout Counted n) {
+void copy(Point q, Patch p, uint t, inout Counted n) {
   const vec2 d = q.at - vec2(p.whole_u.w, p.rest_u.w);
   const Jet h = height_of(p, along(p.whole_u, p.rest_u, d), along(p.whole_v, p.rest_v, d));
-  write(q, t, tile, Answer(h.at, p.error, p.turn * vec2(h.u, h.v), p.grid), 1, false, n);
+  write(q, t, Answer(h.at, p.error, p.turn * vec2(h.u, h.v), p.grid), 1, false, n);
 }
 
-void write_sum(Point q, uint t, Tile tile, inout Counted n) {
-  write(q, t, tile, finish(q.sum), q.sum.reads, q.steep || (q.uncertain && !(q.sum.plain >= kUncertain)), n);
+void write_sum(Point q, uint t, inout Counted n) {
+  write(q, t, finish(q.sum), q.sum.reads, q.steep || (q.uncertain && !(q.sum.plain >= kUncertain)), n);
 }
 
 // One atomic a subgroup and counter.
@@ -162,7 +156,7 @@ void main() {
   Counted n = Counted(0, 0, 0);
   if (kMode == kCopy) {
     const Patch p = load_affine(tile.first + texelFetch(lists, int(from + 1)).x);
-    copy(a, p, t, tile, n), copy(b, p, t, tile, n), copy(c, p, t, tile, n), copy(d, p, t, tile, n);
+    copy(a, p, t, n), copy(b, p, t, n), copy(c, p, t, n), copy(d, p, t, n);
   } else {
     const uint length = texelFetch(lists, int(from)).x;
     if (length == 0) a.wanted = b.wanted = c.wanted = d.wanted = false;
@@ -173,7 +167,7 @@ void main() {
       load_rects(p);
       compose(a, p), compose(b, p), compose(c, p), compose(d, p);
     } while (++k < length);
-    write_sum(a, t, tile, n), write_sum(b, t, tile, n), write_sum(c, t, tile, n), write_sum(d, t, tile, n);
+    write_sum(a, t, n), write_sum(b, t, n), write_sum(c, t, n), write_sum(d, t, n);
   }
   count(n);
 }

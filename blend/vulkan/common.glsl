@@ -1,4 +1,4 @@
-// What every shader of the blend shares: bindings (in the order of evaluator.cpp), layouts, and the mathematics
+// What every shader of the blend shares: bindings (in the order of frame.cpp), layouts, and the mathematics
 // of blend/weight.h and db/basis.h over `real`, which the including shader defines as float or double.
 // Places in a patch are window coordinates (db/patch_surface.h).
 
@@ -21,11 +21,7 @@ layout(binding = 2) uniform samplerBuffer records;   // kRecord texels a slot: P
 layout(binding = 3) readonly buffer Exact { double exact[]; };  // kExactRecord a slot
 layout(binding = 4) uniform samplerBuffer entries;   // kEntry texels: TileEntry of tile_binning.h
 layout(binding = 6) uniform usamplerBuffer lists;    // of a block: its length, then places among its tile's entries
-#ifdef RESULTS  // are read too
-layout(binding = 7) buffer Results { uint results[]; };
-#else
 layout(binding = 7) writeonly buffer Results { uint results[]; };
-#endif
 layout(binding = 9) readonly buffer Points { double points[]; };  // x, y; metres
 
 const int kRecord = 7, kExactRecord = 32, kEntry = 5;
@@ -73,8 +69,6 @@ layout(push_constant) uniform Push {
   uint explicit_points;  // not 0: points in groups of 64, a tile each; results in double
   uint classify;       // 0: every entry of a tile goes to every block
   uint tiles;          // how many there are; their buffer may be larger
-  uint fine, errors_at;  // of block_errors.comp: samples between vertices, where its results begin
-  uint exact_rim;      // not 0: points on the tile's border are evaluated in double
 } push;
 
 // A coordinate along one axis as whole + rest, so that differences to nearby numbers lose nothing.

@@ -34,10 +34,9 @@ VkPipeline Passes::made(OwnedPipeline& pipeline, Planes planes, int mode) {
       std::uint32_t(smoothness_), priority_, planes.gradient, planes.bound, planes.source,
       std::uint32_t(mode)};
   if (pipeline) return pipeline.get();
-  const auto shader = &pipeline == &classify_       ? shaders::classify()
-                      : &pipeline == &block_errors_ ? shaders::block_errors()
-                      : mode == later               ? shaders::exact()
-                                                    : shaders::blend();
+  const auto shader = &pipeline == &classify_ ? shaders::classify()
+                      : mode == later         ? shaders::exact()
+                                              : shaders::blend();
   pipeline = make_pipeline(bindings, shader, constants);
   return pipeline.get();
 }
@@ -141,11 +140,6 @@ void Frame::record(const Work& work, VkCommandBuffer commands) {
   if (work.ragged) run(Passes::holes);
   next();
   run(Passes::later);
-  if (work.push.fine > 0) {
-    barrier(commands);
-    use(passes_.block_errors());
-    vkCmdDispatch(commands, tiles, 1, 1);
-  }
   next();
 }
 

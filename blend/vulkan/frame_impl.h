@@ -16,9 +16,9 @@ struct Push {
   double x0, xc, xr, y0, yc, yr, base;
   std::uint32_t side, blocks, bound_at, source_at, gradient_at;
   float strict_error;
-  std::uint32_t explicit_points, classify, tiles, fine, errors_at, exact_rim;
+  std::uint32_t explicit_points, classify, tiles;
 };
-static_assert(sizeof(Push) == 104);
+static_assert(sizeof(Push) == 96);
 
 /// common.glsl: Tally without the list behind it.
 struct TallyHead {
@@ -46,7 +46,6 @@ class Passes {
   Bindings bindings;
   bool priority() const { return priority_; }
   VkPipeline classify() { return made(classify_, {}, 0); }
-  VkPipeline block_errors() { return made(block_errors_, {}, 0); }
   /// Compiled when first asked for: it takes some 50 ms on lavapipe.
   VkPipeline evaluate(Mode mode, Planes planes) {
     return made(evaluate_[mode][planes.number()], planes, mode);
@@ -56,7 +55,7 @@ class Passes {
   VkPipeline made(OwnedPipeline& pipeline, Planes planes, int mode);
   int smoothness_;
   bool priority_;
-  OwnedPipeline classify_, block_errors_, evaluate_[4][8];
+  OwnedPipeline classify_, evaluate_[4][8];
 };
 
 /// What a submission is made of.

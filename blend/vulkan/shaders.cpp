@@ -11,9 +11,6 @@ constexpr std::uint32_t kClassify[] = {
 constexpr std::uint32_t kBlend[] = {
 #include "blend.comp.inc"
 };
-constexpr std::uint32_t kBlockErrors[] = {
-#include "block_errors.comp.inc"
-};
 constexpr std::uint32_t kExact[] = {
 #include "exact.comp.inc"
 };
@@ -23,6 +20,5 @@ constexpr std::uint32_t kExact[] = {
 std::span<const std::uint32_t> classify() { return kClassify; }
 std::span<const std::uint32_t> blend() { return kBlend; }
 std::span<const std::uint32_t> exact() { return kExact; }
-std::span<const std::uint32_t> block_errors() { return kBlockErrors; }
 
 }  // namespace patchwork::shaders

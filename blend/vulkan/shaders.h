@@ -9,6 +9,5 @@ namespace patchwork::shaders {
 std::span<const std::uint32_t> classify();
 std::span<const std::uint32_t> blend();
 std::span<const std::uint32_t> exact();
-std::span<const std::uint32_t> block_errors();
 
 }  // namespace patchwork::shaders

@@ -110,7 +110,7 @@ vk::Push VulkanBlend::Impl::push() const {
   vk::Push p{};
   p.base = base;
   p.strict_error = options.strict ? float(options.error) : std::numeric_limits<float>::infinity();
-  p.classify = more.classify, p.exact_rim = more.exact_rim;
+  p.classify = more.classify;
   return p;
 }
 

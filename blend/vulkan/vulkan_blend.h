@@ -16,10 +16,9 @@ namespace patchwork {
 struct VulkanOptions {
   std::size_t memory = std::size_t{256} << 20;  ///< bytes: of the patch pool
   int tile = 64;                                ///< vertices along each side of the tiles of at_pixels
-  bool classify = true;    ///< blocks leave out what does not reach them; the bits do not depend on it
-  bool choose = true;      ///< tiles do; else every point walks through all patches
-  bool exact_rim = false;  ///< a tile's outermost vertices are evaluated in double: neighbours get equal bits
-  bool gradient = false;   ///< for tiles: the slope too
+  bool classify = true;   ///< blocks leave out what does not reach them; the bits do not depend on it
+  bool choose = true;     ///< tiles do; else every point walks through all patches
+  bool gradient = false;  ///< for tiles: the slope too
 };
 
 /// Tiles [first, first + count) of a call, vertices row-major, tile after tile, `side` x `side` each whatever
@@ -32,16 +31,6 @@ struct TileHeights {
   std::span<const float> bound = {};          ///< metres
   std::span<const std::int32_t> source = {};  ///< as BlendOutput has it
   std::span<const float> gradient = {};       ///< dh/dx, dh/dy pairs
-};
-
-/// How far blocks of 8 x 8 cells of tiles [first, first + count) of a call depart from the surface when only
-/// every 2nd, 4th, 8th vertex is kept, whichever diagonal splits their cells: blocks row-major, three numbers
-/// each.
-struct TileErrors {
-  std::size_t first = 0, count = 0;
-  int across = 0;  ///< blocks along each side of a tile
-  std::span<const float> lambda =
-      {};  ///< metres, the tile's bound included; infinite where something has no data
 };
 
 /// Pairs of a block of 8 x 8 vertices and a patch of its tile.
@@ -75,12 +64,6 @@ class VulkanBlend : public Evaluator {
   /// runs. REQUIRES: no tile is larger than side x side.
   BlendCounts at_tiles(const RasterFrame& lattice, std::span<const Tile> tiles, int side,
                        const std::function<void(const TileHeights&)>& take) const;
-
-  /// Block errors (design: render), measured against the surface at `fine` points a cell along each axis, and
-  /// half of the largest second differences of these for what lies between.
-  /// REQUIRES: side = 8 n + 1 and every tile is side x side.
-  void block_errors(const RasterFrame& lattice, std::span<const Tile> tiles, int side, int fine,
-                    const std::function<void(const TileErrors&)>& take) const;
 
   const Device& device() const;
   const PatchPool& pool() const;

@@ -16,9 +16,9 @@ struct Curvature {
 };
 void describe(Fields<Curvature>& fields);
 
-/// Metres by which ground seems to sink at `distance` metres in the plane: the parabola of the earth's circle
-/// and the ray's.
+/// Of the parabola of the earth's circle and the ray's: 1/metre.
 inline double drop_per_square(const Curvature& c) { return (1 - c.refraction) / (2 * c.radius); }
+/// Metres by which ground seems to sink at `distance` metres in the plane.
 inline double drop(const Curvature& c, double distance) { return drop_per_square(c) * distance * distance; }
 
 /// Pixels by which ground at `distance` metres moves on the screen at most, anywhere in the picture.

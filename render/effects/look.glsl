@@ -4,7 +4,7 @@ struct Look {
   vec4 sun_direction;  // unit, towards the sun; w: tan of its elevation
   vec4 sun_light;      // colour * strength; w: half the angle over which a shadow fades, radians
   vec4 ambient;        // colour * strength; w: strength of shadows
-  vec4 ground;         // the colour where no tints are; w: strength of the sky's bits
+  vec4 ground;         // the colour where no tints are; w: strength of the sky's light
   vec4 background;     // of the sky; w: metres that ground sinks a square metre of distance
   vec4 air;            // colour; w: 1 / metres of optical depth at the eye's height
   vec4 air_scale;      // x: 1 / scale height, y: height of the eye, metres; z: glow of the sun; w: 1 / glow's radius

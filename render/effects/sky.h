@@ -1,4 +1,4 @@
-// Sky light: how much of the sky a place sees, by k directions, one bit each.
+// Sky light: how much of the sky a place sees, by k directions, 4 to 32.
 #pragma once
 
 #include "render/picture.h"
@@ -17,11 +17,10 @@ struct Sky {
 };
 void describe(Fields<Sky>& fields);
 
-/// Tangent of the elevation of the lowest of its directions: 3.58 degrees or more (sin^2 of it is what a
-/// horizon of that height takes of the light, 1/256) for the 128 directions that sky.glsl can tell apart at
-/// most.
+/// Tangent of the elevation of the lowest of its directions: above 3.58 degrees (sin^2 of that is what a
+/// horizon of that height takes of the light, 1/256) for up to 128 directions.
 double lowest_direction(const Sky& sky);
-/// False only if no direction's bit is taken anywhere where terrain rises by at most `steepest`.
+/// False only if no direction is hidden anywhere where terrain rises by at most `steepest`.
 bool can_matter(const Sky& sky, double steepest);
 
 }  // namespace effects

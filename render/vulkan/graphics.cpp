@@ -64,7 +64,7 @@ OwnedPipeline make_graphics(const Bindings& bindings, VkRenderPass pass, const G
   raster.depthBiasEnable = state.lines, raster.depthBiasConstantFactor = 64;
   VkPipelineDepthStencilStateCreateInfo depth{};
   depth.sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO;
-  depth.depthTestEnable = state.depth_test, depth.depthWriteEnable = state.depth_write;
+  depth.depthTestEnable = VK_TRUE, depth.depthWriteEnable = state.depth_write;
   depth.depthCompareOp = state.compare;
   VkGraphicsPipelineCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO;

@@ -17,7 +17,7 @@ struct GraphicsState {
   std::vector<Stage> stages;
   std::span<const std::uint32_t> constants = {};  ///< specialization constants 0, 1, ... of all stages
   VkPrimitiveTopology topology = VK_PRIMITIVE_TOPOLOGY_PATCH_LIST;
-  bool depth_test = true, depth_write = true;
+  bool depth_write = true;
   VkCompareOp compare = VK_COMPARE_OP_GREATER;
   bool lines = false;  ///< edges of triangles only
 };

@@ -144,8 +144,7 @@ struct TileMaker::Impl {
     if (blend)
       blend->change(patches);
     else
-      blend = std::make_unique<VulkanBlend>(device, db, patches, options,
-                                            VulkanOptions{.memory = memory, .tile = kSide, .gradient = true});
+      blend = std::make_unique<VulkanBlend>(device, db, patches, options, VulkanOptions{.memory = memory});
     counts.bytes += blend->pool().traffic().bytes - before;
     counts.patches += blend->pool().traffic().sent - sent;
   }

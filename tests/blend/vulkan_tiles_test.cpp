@@ -85,27 +85,6 @@ TEST_F(VulkanTiles, ClassificationAndChoiceChangeNoBit) {
     }
 }
 
-TEST_F(VulkanTiles, VerticesThatTilesShareHaveTheSameBitsWithExactRims) {
-  const RasterFrame lattice = turned_raster(db().extent(), 129, 33);
-  // Two tiles side by side, and one of twice the step beside both.
-  const Tile tiles[] = {{0, 0, 1, 33, 33}, {32, 0, 1, 33, 33}, {0, 32, 2, 33, 33}};
-  const Extraction x = extract(db(), {.error = 3});
-  for (const BlendOptions& options : all_blends()) {
-    const VulkanBlend blend(test_device(), db(), x.patches, options, {.exact_rim = true});
-    const Planes p = planes_of(blend, lattice, tiles, 33);
-    const auto at = [&](std::size_t t, int c, int r) {
-      return std::bit_cast<std::uint32_t>(p.height[(t * 33 + std::size_t(r)) * 33 + std::size_t(c)]);
-    };
-    for (int k = 0; k < 33; ++k) {
-      ASSERT_EQ(at(0, 32, k), at(1, 0, k)) << name_of(options);
-      if (k % 2 == 0) {
-        ASSERT_EQ(at(0, k, 32), at(2, k / 2, 0)) << name_of(options);
-        ASSERT_EQ(at(1, k, 32), at(2, 16 + k / 2, 0)) << name_of(options);
-      }
-    }
-  }
-}
-
 TEST_F(VulkanTiles, AHaloIsWhatTheNeighbourHas) {
   const RasterFrame lattice = turned_raster(db().extent(), 96, 15);
   const Tile core[] = {{32, 32, 1, 32, 32}}, halo[] = {{31, 31, 1, 34, 34}}, next[] = {{64, 32, 1, 32, 32}};

@@ -130,6 +130,15 @@ TEST_F(BadInput, OneSampleWide) {
   accepted({make(hill_file(2, 2), "thin.tif")});
 }
 
+// Beyond its last samples a grid is continued: a strip of two by far more than can be stored.
+TEST_F(BadInput, TooNarrowForItsLength) {
+  RasterFile file{.width = 2, .height = 40000, .type = GDT_Int32};
+  file.at = [](int i, int) { return 1e8 * i; };
+  refused({make(file, "strip.tif"), "--accuracy", "1"}, "strip.tif: it is too narrow for its length");
+  file.height = 20;
+  accepted({make(file, "strip.tif"), "--accuracy", "1"});
+}
+
 TEST_F(BadInput, ShearedAndNonFiniteGeotransforms) {
   RasterFile file = other();
   file.geotransform[2] = 5;
@@ -235,7 +244,7 @@ TEST_F(BadInput, NoDatabaseOrAFolder) {
 }
 
 // Who may not write may still read; importing says what is wrong.
-TEST_F(BadInput, ReadOnlyFolder) {
+TEST_F(BadInput, ReadOnlyFolderOrFile) {
   const std::string folder = in_directory("shelf"), db = folder + "/shelf#1?.pwk", tif = make(other());
   std::filesystem::create_directory(folder);
   std::filesystem::copy_file(database_, db);
@@ -253,6 +262,10 @@ TEST_F(BadInput, ReadOnlyFolder) {
               "check the path and its folder");
   EXPECT_FALSE(std::filesystem::exists(folder + "/new.pwk"));
   chmod(folder.c_str(), 0777);
+  const std::string alone = folder + "/alone.pwk";  // a file that is read-only itself
+  std::filesystem::copy_file(database_, alone);
+  chmod(alone.c_str(), 0444);
+  EXPECT_SAYS(complaint(run_program(program, {"import", alone, tif}, person)), "writable");
   chmod(db.c_str(), 0666);
   EXPECT_EQ(run_program(program, {"import", db, tif, "--quiet"}, person).code, 0) << "the same, writable";
 }

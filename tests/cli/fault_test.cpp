@@ -139,18 +139,6 @@ TEST_F(Fault, ASecondWriterIsRefusedWhenTheFirstTakesTooLong) {
   EXPECT_FALSE(has_survey());
 }
 
-TEST_F(Fault, AReadOnlyFileIsReadAndNotWritten) {
-  namespace fs = std::filesystem;
-  if (geteuid() == 0) {  // root may write what it likes: a folder that is none of its file's is what is left
-    EXPECT_EQ(run({"remove", in_directory("absent.pwk"), "hills"}).code, 1);
-    return;
-  }
-  fs::permissions(database_, fs::perms::owner_read);
-  EXPECT_EQ(run({"info", database_}).code, 0);
-  EXPECT_NE(complaint(run(import())).find("writable"), std::string::npos);
-  fs::permissions(database_, fs::perms::owner_read | fs::perms::owner_write);
-}
-
 TEST_F(Fault, RemoveReplaceExportAndCheckWorkTogether) {
   const std::string before = content_hash(database_);
   EXPECT_EQ(run(import()).code, 0);

@@ -92,6 +92,29 @@ TEST_F(Import, UnitsOffsetsAndNodataReachTheHeights) {
   EXPECT_TRUE(std::isnan(height(db, 500505, 4999605)));
 }
 
+// What is stored to within a tolerance may come to lie where the file had no data.
+TEST_F(Import, HeightsThatCameToEqualNodataAreExportedAsHeights) {
+  RasterFile file = hill_file();
+  file.type = GDT_UInt16, file.nodata = 0;
+  file.at = [](int i, int j) { return i < 10 ? 0. : 1 + (i + j) % 3; };
+  const std::string path = make(file, "shore.tif"), back = in_directory("back.tif");
+  for (const char* tolerance : {"2", "0"}) {
+    const std::string db = in_directory(std::string("shore") + tolerance + ".pwk");
+    ASSERT_EQ(run({"import", db, path, "--tolerance", tolerance, "--accuracy", "1", "--quiet"}).code, 0);
+    ASSERT_EQ(run({"export", db, "shore", back, "--quiet"}).code, 0);
+    const GDALDatasetUniquePtr d(GDALDataset::Open(back.c_str()));
+    ASSERT_TRUE(d);
+    GDALRasterBand& band = *d->GetRasterBand(1);
+    std::vector<double> v(60 * 50);
+    ASSERT_EQ(band.RasterIO(GF_Read, 0, 0, 60, 50, v.data(), 60, 50, GDT_Float64, 0, 0, nullptr), CE_None);
+    const double nodata = band.GetNoDataValue();
+    const auto holes =
+        std::count_if(v.begin(), v.end(), [&](double h) { return std::isnan(h) || h == nodata; });
+    EXPECT_EQ(holes, 10 * 50) << tolerance;
+    EXPECT_EQ(std::isnan(nodata), tolerance[0] == '2') << "negative control: else it stays as it was";
+  }
+}
+
 TEST_F(Import, DryRunChangesNothing) {
   const std::string file = make(hill_file(), "hills.tif"), fresh = in_directory("fresh.pwk");
   const Json first = json({"import", fresh, file, "--dry-run", "--json"});

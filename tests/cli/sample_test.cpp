@@ -63,6 +63,9 @@ TEST_F(Sample, TakesEveryUsualFormOfAPoint) {
                            "name,x,y\n\"Lake, 2\",500105,4999895\n",
                            "id Northing Easting\n3 4999895 500105\n",
                            "name;x;y\nLake 2;500105;4999895\n",
+                           "name,x,y\n\"Foo; Bar\",500105,4999895\n",
+                           "name x y\n\"Lake, \"\"2\"\"; N\" 500105 4999895\n",
+                           "pipe;x;y\n5\" wide;500105;4999895\n",
                            "\xEF\xBB\xBFx,y\n500105,4999895\n",
                            "name,z,x,y\n\"a \"\"b\"\", c\",310,500105,4999895\n",
                            "# a comment\nx,y\n500105,4999895\n"}) {

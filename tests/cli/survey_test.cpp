@@ -130,6 +130,16 @@ TEST_F(VolumeVerb, MeasuresBetweenSurveys) {
   const Outcome o = run({"volume", database_, "--before", "plain", "--after", "later"});
   EXPECT_EQ(o.code, 0) << o.err;
   EXPECT_SAYS(o.out, "net ");
+  EXPECT_EQ(v["step"], 10);
+  RasterFile pit{.width = 11, .height = 11};
+  pit.geotransform = {500710, 0.25, 0, 4999700, 0, -0.25};
+  pit.at = [](int, int) { return 90.0; };
+  EXPECT_EQ(run({"import", database_, make(pit, "pit.tif"), "--accuracy", "0.05", "--quiet"}).code, 0);
+  Words words{"volume",   database_, "--json",  "--before", "plain",
+              "--extent", "500700",  "4999600", "500900",   "4999800"};
+  EXPECT_EQ(json(words)["step"], 0.25) << "the best of all there is, which the pit is part of";
+  words.insert(words.end(), {"--after", "later"});
+  EXPECT_EQ(json(words)["step"], 10) << "it is not compared";
   EXPECT_SAYS(complaint(run({"volume", database_, "--before", "nobody"})), "no grid of this name");
   EXPECT_EQ(run({"volume", database_}).code, 2);
 }

@@ -74,7 +74,7 @@ TEST_F(Verbs, NumbersOutOfTheirRangeAreWrongUsage) {
       all.push_back(number);
       return run(all);
     };
-    for (const char* number : {"-5", "nan"}) {
+    for (const char* number : {"-5", "nan", "inf", "1e999"}) {
       const Outcome o = with(number);
       EXPECT_EQ(o.code, 2) << Json(words).dump() << number;
       EXPECT_SAYS(o.err, words.back() + ": it must be");
@@ -149,6 +149,30 @@ TEST_F(Verbs, QueryHasTheKeysThatProgramsRelyOn) {
                   "--json"})["by_grid"]
                 .size(),
             1u);
+}
+
+TEST_F(Verbs, ACorridorNeedsMoreThanItsSurroundings) {
+  const std::string db = hill_database();
+  const auto patches = [&](const Words& options) {
+    Words words{"query", db, "--json"};
+    words.insert(words.end(), options.begin(), options.end());
+    return json(words)["patches"].get<int>();
+  };
+  const Words line{"--corridor", "LINESTRING (500050 4999950, 500250 4999700)", "--error", "0.2", "--outside",
+                   "50"};
+  const auto with = [&](Words more) {
+    more.insert(more.begin(), line.begin(), line.end());
+    return more;
+  };
+  const int narrow = patches(line), wide = patches(with({"--width", "60", "--ramp", "100"}));
+  EXPECT_GT(narrow, patches({"--error", "50"}));
+  EXPECT_LE(narrow, wide);
+  EXPECT_EQ(patches(with({"--width", "1e6"})), patches({"--error", "0.2"})) << "all of it is in the corridor";
+  EXPECT_EQ(run({"query", db, "--corridor", "0 0, 1 1", "--error", "1"}).code, 2);
+  EXPECT_EQ(run({"query", db, "--error", "1", "--outside", "3"}).code, 2);
+  EXPECT_EQ(run({"query", db, "--error", "1", "--width", "3"}).code, 2);
+  EXPECT_SAYS(complaint(run({"query", db, "--corridor", "0 0", "--error", "1", "--outside", "3"})),
+              "two points");
 }
 
 TEST_F(Verbs, RenderTessellatesAsItIsTold) {

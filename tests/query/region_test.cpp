@@ -138,10 +138,58 @@ TEST(Region, APolygonWithANotchMeetsWhereOneOfItsPartsDoes) {
   EXPECT_GT(only_bounds, 0u) << "negative control: the notch keeps some out";
 }
 
+// A star of many corners, whose sides lie in many slabs, against all of its sides one by one.
+TEST(Region, APolygonOfManyCornersIsThatOfItsSides) {
+  std::mt19937_64 random(test_seed(5));
+  std::uniform_real_distribution<double> share(0, 1);
+  for (const int n : {3, 40, 3000}) {
+    Corners star;
+    for (int k = 0; k < n; ++k) {
+      const double r = 300 + 700 * share(random), a = 2 * M_PI * k / n;
+      star.push_back({800 + r * std::cos(a), 600 + r * std::sin(a)});
+    }
+    const Region region = Region::inside(star);
+    std::size_t in = 0;
+    constexpr int kTries = 4000;
+    for (int t = 0; t < kTries; ++t) {
+      const Point p{-300 + 2200 * share(random), -500 + 2200 * share(random)};
+      bool inside = false;
+      for (std::size_t k = 0; k < star.size(); ++k) {
+        const Point &a = star[k], &b = star[(k + 1) % star.size()];
+        if ((a.y > p.y) != (b.y > p.y)) inside ^= p.x < a.x + (b.x - a.x) * ((p.y - a.y) / (b.y - a.y));
+      }
+      EXPECT_EQ(region.contains(p), inside) << n;
+      in += inside;
+    }
+    EXPECT_GT(in, 0u);
+    EXPECT_LT(in, std::size_t(kTries));
+    // A block that holds a point of the polygon, or a corner, meets it.
+    const Grid grid = grid_at(17);
+    std::size_t met = 0;
+    for (std::size_t k = 0; k < grid.info.shape.blocks(); ++k) {
+      const GridShape::Block b = grid.info.shape.block(k);
+      const Corners c = domain_of(grid, b);
+      const LatticeRect d = grid.info.shape.domain(b.level, b.bx, b.by);
+      bool must = std::any_of(c.begin(), c.end(), [&](Point p) { return region.contains(p); });
+      for (const Point& p : star) {
+        const Point at = grid.info.frame.to_lattice(p.x, p.y);
+        must |= at.x > d.i0 && at.x < d.i1 && at.y > d.j0 && at.y < d.j1;
+      }
+      met += region.meets(grid, b);
+      if (must) {
+        EXPECT_TRUE(region.meets(grid, b)) << n;
+      }
+    }
+    EXPECT_GT(met, 0u);
+    EXPECT_LT(met, grid.info.shape.blocks());
+  }
+}
+
 TEST(Region, TextIsReadAsPairsOfCoordinates) {
   const Extent expected{0, -1.5, 20, 30};
   for (const char* text : {"0 -1.5, 20 0, 10 30", "POLYGON((0 -1.5, 20 0, 10 30, 0 -1.5))",
-                           "POLYGON ((0 -1.5,20 0,10 3e1,0 -1.5))", " 0 -1.5 ,20 0 , 10 30 "}) {
+                           "POLYGON ((0 -1.5,20 0,10 3e1,0 -1.5))", " 0 -1.5 ,20 0 , 10 30 ",
+                           "POLYGON Z ((0 -1.5 320, 20 0 300, 10 30 7, 0 -1.5 320))"}) {
     const Extent b = Region::parse_polygon(text).bounds();
     EXPECT_TRUE(b.xmin == expected.xmin && b.ymin == expected.ymin && b.xmax == expected.xmax &&
                 b.ymax == expected.ymax)
@@ -152,7 +200,8 @@ TEST(Region, TextIsReadAsPairsOfCoordinates) {
 TEST(Region, WhatIsNoRegionIsRefusedWithAReason) {
   for (const char* text :
        {"", "0 0, 1 1", "0 0, 1 0, 1 1, 5", "0 0, 1 0, 1 1 7", "0 0, 1 0, x 1", "0 0, 1 0, nan 1",
-        "0 0, 1 0, 1 1 north", "POLYGON((0 0, 1 0, 1 1), (0 0, 1 0, 1 1))", "0 0, 1 0, 1e999 1"})
+        "0 0, 1 0, 1 1 north", "POLYGON((0 0, 1 0, 1 1), (0 0, 1 0, 1 1))", "0 0, 1 0, 1e999 1",
+        "0 0 1 0, 1 1 0 1, 2 2 3 3"})
     EXPECT_NE(refusal_of([&] { Region::parse_polygon(text); }), "") << text;
   EXPECT_NE(refusal_of([] { Region::inside(Corners{{0, 0}, {1, 0}}); }), "");
   EXPECT_NE(refusal_of([] { Region::inside(Corners{{0, 0}, {1, 0}, {NAN, 1}}); }), "");

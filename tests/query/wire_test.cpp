@@ -53,6 +53,19 @@ int differing_samples(const PatchSurface& a, const PatchSurface& b, int& compare
   return n;
 }
 
+int differing_holes(const PatchSurface& a, const PatchSurface& b) {
+  if (!a.holes || !b.holes) return bool(a.holes) != bool(b.holes);
+  const double step = std::exp2(a.level);
+  int n = 0;
+  for (int j = 0; j <= std::floor(a.domain.j1 / step - a.first_j) + 1; ++j)
+    for (int i = 0; i <= std::floor(a.domain.i1 / step - a.first_i) + 1; ++i) {
+      const auto k = std::size_t(j * PatchSurface::kSide + i);
+      n += a.holes->answering[k] != b.holes->answering[k] || a.holes->real[k] != b.holes->real[k] ||
+           a.holes->near[k] != b.holes->near[k] || a.holes->wide[k] != b.holes->wide[k];
+    }
+  return n;
+}
+
 TEST_F(Wire, AClientGetsWhatAReaderHas) {
   int holed = 0, compared = 0;
   for (const double error : {0.0, 0.5, 3.0, 20.0}) {
@@ -72,12 +85,8 @@ TEST_F(Wire, AClientGetsWhatAReaderHas) {
       EXPECT_EQ(p.surface.domain.i1, s->domain.i1);
       EXPECT_EQ(p.surface.kernel.j0, s->kernel.j0);
       EXPECT_EQ(differing_samples(*s, p.surface, compared), 0);
-      ASSERT_EQ(p.surface.holes != nullptr, s->holes != nullptr);
+      EXPECT_EQ(differing_holes(*s, p.surface), 0);
       holed += s->holes != nullptr;
-      if (s->holes) {
-        EXPECT_EQ(p.surface.holes->near[5 * PatchSurface::kSide + 5],
-                  s->holes->near[5 * PatchSurface::kSide + 5]);
-      }
     }
     std::vector<PatchId> wanted = d.add;
     std::sort(ids.begin(), ids.end()), std::sort(wanted.begin(), wanted.end());

@@ -175,8 +175,16 @@ TEST_F(InsertionTest, TessellationErrorWhileSurveysComeIn) {
         const double error = screen_error(*best, camera, r.depth()).worst;
         EXPECT_LE(error, tau * 1.001 + 0.01) << name << ", tau " << tau << " view " << n;
         worst = std::max(worst, error / tau);
+        EXPECT_EQ(pinholes(camera, r.depth()), 0u) << name << ", tau " << tau << " view " << n;
       }
       EXPECT_EQ(r.cache().find_violation(), "");
+      const Camera whole{{800, -200, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+      r.draw(whole);
+      std::vector<float> depth = r.depth();
+      const auto middle = std::size_t(kHeight / 2 * kWidth + kWidth / 2);
+      ASSERT_FALSE(std::isnan(depth[middle]));
+      depth[middle] = NAN;
+      EXPECT_EQ(pinholes(whole, depth), 1u) << "negative control";
     }
     report_case("TessellationError", fmt::format("{}, views while three surveys come in", name), 200, worst,
                 1.021, "of the pixels asked");

@@ -76,4 +76,15 @@ inline ScreenError screen_error(const Blend& best, const Camera& camera, const s
   return e;
 }
 
+/// Pixels of background between drawn ones on all four sides: no terrain looks so where it is whole, since
+/// what is behind it lies above it.
+inline std::size_t pinholes(const Camera& camera, const std::vector<float>& depth) {
+  const auto drawn = [&](int c, int r) { return !std::isnan(depth[std::size_t(r * camera.width + c)]); };
+  std::size_t n = 0;
+  for (int r = 1; r + 1 < camera.height; ++r)
+    for (int c = 1; c + 1 < camera.width; ++c)
+      n += !drawn(c, r) && drawn(c - 1, r) && drawn(c + 1, r) && drawn(c, r - 1) && drawn(c, r + 1);
+  return n;
+}
+
 }  // namespace patchwork

@@ -32,6 +32,12 @@ set key outside right top vertical Left reverse samplen 2 spacing 1.3 width -2
 set format "%g"
 )";
 
+// Inside of gnuplot's single quotes.
+std::string quoted(std::string text) {
+  for (std::size_t at = 0; (at = text.find('\'', at)) != std::string::npos; at += 2) text.insert(at, 1, '\'');
+  return text;
+}
+
 // A gnuplot script under construction: data blocks, then a picture.
 class Script {
  public:
@@ -42,7 +48,7 @@ class Script {
     text_ += fmt::format(
         "reset session\n{}set terminal svg size 860,440 dynamic font 'DejaVu Sans,13' background '#ffffff'\n"
         "set output '{}'\n{}{}\n{}\nset output\n",
-        kStyle, path(name), blocks_, settings, plot);
+        kStyle, quoted(path(name)), blocks_, settings, plot);
     blocks_.clear();
   }
   // Lines of numbers or quoted words under the name $`name`.

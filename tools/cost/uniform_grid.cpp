@@ -14,6 +14,8 @@ namespace patchwork::cli {
 
 namespace {
 
+constexpr int kFewBlocks = 512;  // pixels along a side: four blocks of the file
+
 GDALDatasetUniquePtr create(const std::string& path, int width, int height) {
   GDALDriver* driver = GetGDALDriverManager()->GetDriverByName("GTiff");
   const char* const options[] = {"TILED=YES",   "COMPRESS=ZSTD",        "ZSTD_LEVEL=1",
@@ -27,10 +29,12 @@ GDALDatasetUniquePtr create(const std::string& path, int width, int height) {
   return file;
 }
 
-GDALDatasetUniquePtr open_level(const std::string& path, int level) {
+// `threads`: to start them takes longer than to read a level of a few blocks.
+GDALDatasetUniquePtr open_level(const std::string& path, int level, bool threads) {
   const std::string only = level > 0 ? std::to_string(level - 1) + " only" : "NONE",
                     overview = "OVERVIEW_LEVEL=" + only;
-  const char* const options[] = {"NUM_THREADS=ALL_CPUS", overview.c_str(), nullptr};
+  const char* const options[] = {threads ? "NUM_THREADS=ALL_CPUS" : "NUM_THREADS=1", overview.c_str(),
+                                 nullptr};
   GDALDatasetUniquePtr file(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER, nullptr, options, nullptr));
   if (!file) throw Error(path, "GDAL cannot open the uniform grid");
   return file;
@@ -48,7 +52,7 @@ struct UniformGrid::Level {
   std::vector<double> at_points;
 
   Level(const std::string& path, int level, const Extent& e, const CheckPoints& points) : factor(1 << level) {
-    const GDALDatasetUniquePtr file = open_level(path, level);
+    const GDALDatasetUniquePtr file = open_level(path, level, true);
     width = file->GetRasterXSize(), height = file->GetRasterYSize();
     std::vector<float> v(std::size_t(width) * std::size_t(height));
     check(file->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, width, height, v.data(), width, height, GDT_Float32,
@@ -78,9 +82,8 @@ UniformGrid::UniformGrid(const Database& db, const Extent& extent, const CheckPo
   const double most = std::min(double(kMostSide), std::sqrt(double(memory / 4 / sizeof(float))));
   step_ = std::max(finest, longer / most), complete_ = step_ == finest;
   const Raster raster = Raster::covering(extent, step_);
-  extent_ = {raster.xmin, raster.ymax - raster.height * step_, raster.xmin + raster.width * step_,
-             raster.ymax};
-  const Extraction all = extract(db, {.error = 0, .region = Region::inside(extent)});
+  extent_ = raster.extent();
+  const Extraction all = extract(db, {.error = 0, .region = Region::inside(extent_)});
   std::vector<float> heights(std::size_t(raster.width) * std::size_t(raster.height));
   Blend(db, all.patches, {})
       .at_pixels(raster.frame(), raster.width, 0, raster.height,
@@ -136,7 +139,7 @@ double UniformGrid::read(int level, const Extent& window, int side) const {
   if (how.dfXSize < side) how.eResampleAlg = GRIORA_Bilinear;
   std::vector<float> out(std::size_t(side) * std::size_t(side));
   const auto start = std::chrono::steady_clock::now();
-  const GDALDatasetUniquePtr file = open_level(path_, level);
+  const GDALDatasetUniquePtr file = open_level(path_, level, std::max(width, height) > kFewBlocks);
   check(file->GetRasterBand(1)->RasterIO(GF_Read, x, y, width, height, out.data(), side, side, GDT_Float32, 0,
                                          0, &how),
         path_);

@@ -17,14 +17,14 @@ struct SelfTestOptions {
   std::uint64_t memory = kDefaultMemory;
 };
 
-/// What a case found. It holds where the worst is at most the limit.
+/// What a case found. It holds where something was tried, and the worst is at most the limit.
 struct Verdict {
   std::string name, law;  ///< the law in a few words
   std::uint64_t tries = 0;
   double worst = 0, limit = 0;
   std::string unit;      ///< of worst and limit
   std::string left_out;  ///< why the case was not tried; empty where it was
-  bool holds() const { return !left_out.empty() || worst <= limit; }
+  bool holds() const { return !left_out.empty() || (tries > 0 && worst <= limit); }
 };
 
 /// What the cases share.

@@ -139,7 +139,8 @@ Verdict bound_is_what_was_asked(Trial& t) {
       const double asked = cut->at(p);
       if (!inside || (!uniform && seen.size() < 3) || !(asked > 0) || !offers(t.db, p, asked)) continue;
       ++v.tries;
-      v.worst = std::max(v.worst, (h.bound[k] - kHairline * x.bound_max) / asked);
+      const double part = (h.bound[k] - kHairline * x.bound_max) / asked;
+      v.worst = std::max(v.worst, std::isnan(part) ? INFINITY : part);  // no answer at all
     }
   }
   if (v.tries == 0) v.left_out = "no point was met where a kernel offers what was asked";

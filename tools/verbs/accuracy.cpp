@@ -88,8 +88,8 @@ void run(const Options& o, const Common& common) {
   const bool whole = o.region.extent.empty() && o.region.polygon.empty();
   const Extent extent = whole ? db.extent() : region.bounds();
   const Raster raster = Raster::covering(extent, step_of(db, extent, o.step));
-  const Extraction x =
-      extract(db, {.error = o.surface.error, .region = Region::inside(extent), .strict = o.surface.strict});
+  const Extraction x = extract(
+      db, {.error = o.surface.error, .region = Region::inside(raster.extent()), .strict = o.surface.strict});
   const auto surface = make_evaluator(db, x.patches, o.surface, common.memory);
   Area area{.frame = raster.frame(), .width = raster.width, .height = raster.height};
   if (!whole) area.inside = [&](Point p) { return region.contains(p); };

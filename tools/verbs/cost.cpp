@@ -71,8 +71,8 @@ void run(const CostOptions& o, const Common& common) {
   std::filesystem::create_directories(o.folder, failed);
   if (failed) throw Error(o.folder, "it cannot be made", failed.message());
   const CostReport report = measure_cost(o, common);
-  const std::vector<std::string> files = write_cost(report, o.folder);
   keep_model(report, o.database, common);
+  const std::vector<std::string> files = write_cost(report, o.folder);
   for (const std::string& n : report.notes) note(common, "note: " + n);
   if (common.json)
     print(json_of(report, files));

@@ -21,8 +21,9 @@ struct Options {
   std::size_t patches = 0, bytes = 0;  // budgets; 0: none
   double milliseconds = 0;
   bool cone = false;
-  std::string field;
-  double outside = 0;
+  std::string field, corridor;
+  std::optional<double> outside;
+  double width = 0, ramp = 0;
   bool explain = false;
   bool budgeted() const { return patches > 0 || bytes > 0 || milliseconds > 0; }
 };
@@ -54,7 +55,7 @@ FieldCut field_of(const Database& db, const Options& o, const Common& common) {
                .width = file.width(),
                .height = file.height(),
                .tolerance = {},
-               .outside = o.outside,
+               .outside = o.outside.value_or(0),
                .region = o.region.region(),
                .strict = o.strict};
   std::vector<double> row(std::size_t(cut.width));
@@ -63,6 +64,16 @@ FieldCut field_of(const Database& db, const Options& o, const Common& common) {
     for (const double raw : row) cut.tolerance.push_back(float(raw * file.scale() + file.offset()));
   }
   return cut;
+}
+
+CorridorCut corridor_of(const Options& o) {
+  return {.line = parse_points("corridor", o.corridor),
+          .error = *o.error,
+          .outside = *o.outside,
+          .width = o.width,
+          .ramp = o.ramp,
+          .region = o.region.region(),
+          .strict = o.strict};
 }
 
 // How an error (metres, or pixels of a view) becomes a cut, and which error is asked for.
@@ -78,11 +89,20 @@ Question question(const Database& db, const Options& o, const Common& common) {
     throw CLI::ValidationError("--eye", "a view brings its own error and region");
   if (!o.field.empty() && (view || o.error || o.budgeted()))
     throw CLI::ValidationError("--field", "a field brings its own error, and has no budget");
+  if (!o.corridor.empty() && (view || !o.field.empty() || o.budgeted()))
+    throw CLI::ValidationError("--corridor", "it goes with no view, field or budget");
+  if (!o.corridor.empty() && (!o.error || !o.outside))
+    throw CLI::RequiredError("--corridor: --error within it, and --outside");
+  if (o.outside && o.field.empty() && o.corridor.empty())
+    throw CLI::RequiredError("--outside: --field or --corridor");
   if (!view && !o.error && o.field.empty() && !o.budgeted())
     throw CLI::RequiredError("--error, --eye with --look, --field, --patches, --bytes or --milliseconds");
   if (o.strict && o.error == 0.) refuse_strict();
   if (!o.field.empty())
-    return {[cut = field_of(db, o, common)](double) { return make_surface(cut); }, o.outside, o.outside, "m"};
+    return {[cut = field_of(db, o, common)](double) { return make_surface(cut); }, o.outside.value_or(0),
+            o.outside.value_or(0), "m"};
+  if (!o.corridor.empty())
+    return {[cut = corridor_of(o)](double) { return make_surface(cut); }, *o.error, *o.outside, "m"};
   if (view)
     return {[v = view_of(db, o)](double error) mutable {
               v.pixel_error = error;
@@ -159,7 +179,10 @@ Json json_of(const Database& db, PatchId id) {
 void print_text(const Database& db, const Asked& asked, const Options& o) {
   const Extraction& x = asked.extraction;
   const std::string where =
-      o.field.empty() ? fmt::format("at error {:g} {}", asked.error, asked.unit) : "at the field's errors";
+      !o.field.empty() ? "at the field's errors"
+      : !o.corridor.empty()
+          ? fmt::format("at error {:g} m along the corridor, {:g} m outside", asked.error, *o.outside)
+          : fmt::format("at error {:g} {}", asked.error, asked.unit);
   fmt::print("{} patches {}: bounds {:.4g} to {:.4g} m", x.patches.size(), where, x.error_available,
              x.bound_inside);
   if (x.bound_max > x.bound_inside)
@@ -240,10 +263,21 @@ void add_query(CLI::App& app, Common& common) {
       ->excludes("--bytes");
   v->add_option("--field", o->field, "a raster of errors, metres, that each place may have")
       ->check(CLI::ExistingFile);
-  v->add_option("--outside", o->outside, "the error beyond the field, and where it has no data, metres")
-      ->needs("--field")
+  auto* corridor =
+      v->add_option("--corridor", o->corridor,
+                    "a line that needs --error while the rest may have --outside: \"x y, x y\" or WKT");
+  v->add_option("--width", o->width, "of the corridor, metres to either side")
+      ->needs(corridor)
       ->check(zero_or_more())
       ->capture_default_str();
+  v->add_option("--ramp", o->ramp, "over which the corridor's error becomes that outside, metres")
+      ->needs(corridor)
+      ->check(zero_or_more())
+      ->capture_default_str();
+  v->add_option(
+       "--outside", o->outside,
+       "the error beyond the corridor; or beyond the field and where it has no data (else 0), metres")
+      ->check(zero_or_more());
   v->add_flag("--explain", o->explain, "what the answer will cost, and nothing else")
       ->excludes("--patches")
       ->excludes("--bytes")

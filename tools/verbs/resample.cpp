@@ -128,8 +128,8 @@ void run(const Options& o, const Common& common) {
   const Extent extent = o.region.extent.empty() ? to_micrometres(db.extent()) : o.region.region().bounds();
   const Raster raster = Raster::covering(extent, o.step > 0 ? o.step : finest_step(db, extent));
   const double open_seconds = seconds_since(start);
-  const Extraction x =
-      extract(db, {.error = o.surface.error, .region = Region::inside(extent), .strict = o.surface.strict});
+  const Extraction x = extract(
+      db, {.error = o.surface.error, .region = Region::inside(raster.extent()), .strict = o.surface.strict});
   const double fetch_seconds = prefetch(db, x.patches, common.memory);
   const std::unique_ptr<Evaluator> blend = make_evaluator(db, x.patches, o.surface, common.memory);
   const auto writing = std::chrono::steady_clock::now();

@@ -34,8 +34,17 @@ std::string_view trimmed(std::string_view text) {
 class Fields {
  public:
   explicit Fields(std::string_view line) : left_(trimmed(line)), more_(!left_.empty()) {
-    for (const char c : {',', ';', '\t'})
-      if (left_.find(c) != std::string_view::npos) separator_ = c;
+    // The one that counts most of those outside of quotes, which begin with a field.
+    constexpr std::string_view kSeparators = ",;\t";
+    std::size_t best = 0;
+    bool begins = true;
+    for (std::size_t at = 0; at < left_.size(); ++at) {
+      if (begins && left_[at] == '"') at = std::min(closing_quote(at), left_.size() - 1);
+      const std::size_t rank = kSeparators.find(left_[at]);
+      if (rank != std::string_view::npos && rank + 1 > best) best = rank + 1, separator_ = left_[at];
+      begins =
+          rank != std::string_view::npos || (begins && kBlanks.find(left_[at]) != std::string_view::npos);
+    }
   }
 
   bool more() const { return more_; }
@@ -53,10 +62,11 @@ class Fields {
   }
 
  private:
-  // Where a field begins that may end at a separator: behind what is quoted, in which two quotes are one.
-  std::size_t behind_quotes() const {
-    if (left_.empty() || left_.front() != '"') return 0;
-    std::size_t at = left_.find('"', 1);
+  // Where a field begins that may end at a separator: behind what is quoted.
+  std::size_t behind_quotes() const { return !left_.empty() && left_.front() == '"' ? closing_quote(0) : 0; }
+  // Of what is quoted from `open` on; two quotes in it are one.
+  std::size_t closing_quote(std::size_t open) const {
+    std::size_t at = left_.find('"', open + 1);
     while (at != std::string_view::npos && at + 1 < left_.size() && left_[at + 1] == '"')
       at = left_.find('"', at + 2);
     return at;

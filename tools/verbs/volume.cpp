@@ -90,7 +90,13 @@ void run(const Options& o, const Common& common) {
   const Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
   const Extent extent = extent_of(db, o);
-  const double step = o.step > 0 ? o.step : finest_step(db, extent);
+  // Pixels as fine as what is compared, whatever else lies there.
+  std::vector<GridId> compared = ids_of(db, o.after);
+  if (!compared.empty() && !o.plane) {
+    const std::vector<GridId> before = ids_of(db, o.before);
+    compared.insert(compared.end(), before.begin(), before.end());
+  }
+  const double step = o.step > 0 ? o.step : finest_step(db, extent, compared);
   const Surface after(db, o.after, extent, o.smoothness);
   std::optional<Surface> before;
   if (!o.plane) before.emplace(db, o.before, extent, o.smoothness);

@@ -77,10 +77,7 @@ TEST_F(BoundHolds, IsWhatWasAskedForWhereverAKernelOffersIt) {
 }
 
 // PATCHWORK_TRIALS=1000 takes as many cameras, and points a camera, as the design asks for.
-int cameras() {
-  const char* given = std::getenv("PATCHWORK_TRIALS");
-  return given ? std::atoi(given) : 40;
-}
+int cameras() { return test_trials(40); }
 
 TEST_F(BoundHolds, UnderViewsWhereverAKernelOffersIt) {
   const auto offers = [](double error, Point at) {

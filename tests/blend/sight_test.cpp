@@ -26,10 +26,7 @@ GridFile walls() {
 }
 
 // PATCHWORK_TRIALS=1000000 takes as many rays as the design asks for.
-std::size_t trials() {
-  const char* given = std::getenv("PATCHWORK_TRIALS");
-  return given ? std::strtoull(given, nullptr, 10) : 4000;
-}
+std::size_t trials() { return std::size_t(test_trials(4000)); }
 
 class GrazingRays : public ::testing::Test {
  protected:

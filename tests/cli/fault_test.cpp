@@ -20,10 +20,7 @@ using std::chrono::steady_clock;
 
 // PATCHWORK_TRIALS=200 tries as often as the design asks for; with TMPDIR on a disk of 16 MB, that one fills
 // up.
-int trials() {
-  const char* given = std::getenv("PATCHWORK_TRIALS");
-  return given ? std::atoi(given) : 24;
-}
+int trials() { return test_trials(24); }
 
 class Fault : public CliTest {
  protected:

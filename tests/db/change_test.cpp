@@ -92,7 +92,10 @@ class Trial {
     EXPECT_EQ(db_->content_hash(), expected.hash);
     EXPECT_EQ(db_->tree().find_violation(), "");
     expect_query();
+    watch_redundant();
   }
+  /// Patches that were redundant while their grid was in, and later not.
+  std::size_t needed_again() const { return needed_again_; }
   const std::set<std::size_t>& in() const { return in_; }
   Database& db() { return *db_; }
   std::size_t sets() const { return known_.size(); }
@@ -119,6 +122,18 @@ class Trial {
     EXPECT_EQ(found, scanned);
   }
 
+  void watch_redundant() {
+    std::set<std::pair<std::string, std::size_t>> now;
+    for (const Grid& g : db_->grids())
+      each_patch(g, [&](std::size_t k, auto) {
+        const std::pair place{g.info.name, k};
+        const bool was = redundant_.contains(place);
+        needed_again_ += was && !g.patches[k].dormant();
+        if (g.patches[k].dormant()) now.insert(place);
+      });
+    redundant_ = std::move(now);
+  }
+
   const Expected& of_set() {
     const auto [at, is_new] = known_.try_emplace(in_);
     if (!is_new) return at->second;
@@ -142,19 +157,16 @@ class Trial {
   std::vector<RasterSource> sources_;
   std::optional<Database> db_;
   std::set<std::size_t> in_;
+  std::set<std::pair<std::string, std::size_t>> redundant_;
+  std::size_t needed_again_ = 0;
   std::map<std::set<std::size_t>, Expected> known_;
 };
-
-int trials(int standard) {
-  const char* given = std::getenv("PATCHWORK_TRIALS");
-  return given ? std::atoi(given) : standard;
-}
 
 // PATCHWORK_TRIALS=2000 takes as many steps as the design asks for.
 TEST(Change, RandomInsertsRemovalsAndReopeningsAgreeWithTheModelAfterEveryStep) {
   Trial trial(test_seed(1), 7);
   std::size_t most = 0;
-  for (int n = 0; n < trials(400) && !testing::Test::HasFailure(); ++n) {
+  for (int n = 0; n < test_trials(400) && !testing::Test::HasFailure(); ++n) {
     trial.step();
     trial.expect_as_modelled();
     most = std::max(most, trial.in().size());
@@ -164,7 +176,9 @@ TEST(Change, RandomInsertsRemovalsAndReopeningsAgreeWithTheModelAfterEveryStep) 
   }
   EXPECT_GE(most, 4u);
   EXPECT_GT(trial.sets(), 20u);
-  report_law("InsertRemove", "random insertions, removals and reopenings", std::uint64_t(trials(400)));
+  report_law("InsertRemove", "random insertions, removals and reopenings", std::uint64_t(test_trials(400)));
+  report_control("InsertRemove", "redundant patches dropped for good, that were needed again",
+                 std::uint64_t(test_trials(400)), double(trial.needed_again()), 0, "patches");
 }
 
 TEST(InsertRemove, GivesBackTheDatabaseThatNeverSawTheGrid) {

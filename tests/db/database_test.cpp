@@ -85,10 +85,7 @@ class Orders {
 };
 
 // PATCHWORK_TRIALS=200 tries as many shuffles as the design asks for.
-int shuffles() {
-  const char* given = std::getenv("PATCHWORK_TRIALS");
-  return given ? std::atoi(given) : 8;
-}
+int shuffles() { return test_trials(8); }
 
 // All 720 orders of six grids, a test for each grid that may come first.
 class OrderPermutations : public testing::TestWithParam<int> {};

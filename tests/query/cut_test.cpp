@@ -19,10 +19,7 @@ namespace patchwork {
 namespace {
 
 // PATCHWORK_TRIALS=10000 asks as many cuts as the design does.
-int trials(int standard) {
-  const char* given = std::getenv("PATCHWORK_TRIALS");
-  return given ? std::atoi(given) : standard;
-}
+int trials(int standard) { return test_trials(standard); }
 
 class Random {
  public:
@@ -120,7 +117,7 @@ class LodTreeCuts : public testing::TestWithParam<int> {};
 TEST_P(LodTreeCuts, AgreeWithScanningEveryBoxBeforeAndAfterChanges) {
   Random random(test_seed(1));
   std::vector<LodEntry> all;
-  const std::uint64_t boxes = trials(0) >= 10000 ? 100000 : 20000;
+  const std::uint64_t boxes = trials(1) >= 10000 ? 100000 : 20000;
   for (std::uint64_t k = 0; k < boxes; ++k) all.push_back(random_box(random, k));
   LodTree tree = LodTree::build(all);
   std::size_t found = 0, spare = 0;

@@ -18,10 +18,9 @@ namespace {
 // Kernels that cover are grown by 1/1024 of a cell: in such a hairline a ramp is that far from 1.
 constexpr double kHairline = 1.0 / 512;
 
-// PATCHWORK_TRIALS=1000 takes as many cameras as the design asks for; where it is set, 10^5 points each.
-const char* trials() { return std::getenv("PATCHWORK_TRIALS"); }
-int cameras() { return trials() ? std::atoi(trials()) : 20; }
-int points_a_camera() { return trials() ? 100'000 : 5'000; }
+// PATCHWORK_TRIALS=1000 takes as many cameras as the design asks for; then with 10^5 points each.
+int cameras() { return test_trials(20); }
+int points_a_camera() { return cameras() >= 1000 ? 100'000 : 5'000; }
 
 class ViewCuts : public testing::Test {
  protected:

@@ -30,6 +30,7 @@ void scan_area(const Evaluator& surface, const Area& area, const std::function<v
              std::span<const double>(bound).subspan(from, width),
              std::span<const std::int32_t>(source).subspan(from, width)});
     }
+    if (area.progress) area.progress(double(row + rows) / area.height);
   }
 }
 

@@ -12,7 +12,8 @@ namespace patchwork {
 struct Area {
   RasterFrame frame;  ///< of the pixel centres
   int width = 0, height = 0;
-  std::function<bool(Point)> inside = {};  ///< may be empty: all of the raster
+  std::function<bool(Point)> inside = {};     ///< may be empty: all of the raster
+  std::function<void(double)> progress = {};  ///< may be empty; told the share of rows that is done
 
   double pixel() const;  ///< square metres
   Point centre(int c, int r) const {

@@ -56,6 +56,13 @@ CLI::Validator above_zero() {
           "above 0"};
 }
 
+CLI::Validator finite() {
+  return {[](const std::string& s) {
+            return std::isfinite(std::strtod(s.c_str(), nullptr)) ? "" : std::string("it must be a number");
+          },
+          "finite"};
+}
+
 CLI::Validator zero_or_more() {
   return {[](const std::string& s) {
             const double v = std::strtod(s.c_str(), nullptr);

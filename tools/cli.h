@@ -52,6 +52,7 @@ CLI::App* verb(CLI::App& app, Common& common, const std::string& name, const std
 /// Checks of an option's number; what is no number does not pass.
 CLI::Validator above_zero();
 CLI::Validator zero_or_more();
+CLI::Validator finite();
 
 /// A bar with share, rate and remaining time on stderr: on a terminal, when the work lasts longer than a
 /// second.

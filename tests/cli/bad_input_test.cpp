@@ -159,10 +159,14 @@ TEST_F(BadInput, ShearedAndNonFiniteGeotransforms) {
 }
 
 TEST_F(BadInput, ImpossibleAccuracyAndOffset) {
-  const std::string path = make(other(), "o.tif");
-  refused({path, "--accuracy", "-1"}, "--accuracy");
-  refused({path, "--accuracy", "nan"}, "--accuracy");
-  refused({path, "--vertical-offset", "inf"}, "--vertical-offset");
+  const std::string path = make(other(), "o.tif"), db = in_directory("new.pwk");
+  for (const Words& option :
+       {Words{"--accuracy", "-1"}, {"--accuracy", "nan"}, {"--vertical-offset", "inf"}}) {
+    const Outcome o = run({"import", db, path, option[0], option[1]});
+    EXPECT_EQ(o.code, 2) << "wrong usage";
+    EXPECT_SAYS(o.err, option[0] + ": it must be");
+    EXPECT_FALSE(std::filesystem::exists(db));
+  }
   accepted({path, "--accuracy", "0", "--vertical-offset", "-3"});
 }
 

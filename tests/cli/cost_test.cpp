@@ -80,7 +80,7 @@ TEST_F(CostTest, FilesSayTheSameAndThePageNeedsNothingElse) {
                 1e-9 * double(r["ms_total"]));
     if (r["knob"] == "reference") reference.push_back(r["patches"]);
   }
-  ASSERT_EQ(reference.size(), 5u);
+  ASSERT_EQ(reference.size(), 4u) << "three of the blend, a frame";
   EXPECT_EQ(reference[0], 1321) << "of any database";
   EXPECT_GT(reference[0], reference[1]);
   EXPECT_GT(reference[1], reference[2]);

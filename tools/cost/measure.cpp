@@ -390,15 +390,13 @@ class Bench {
     const Extent e = reference_->extent();
     reference_points_ = std::make_unique<CheckPoints>(*reference_, e, kReferencePoints);
     std::vector<Setting> all;
-    const auto add_one = [&](const std::string& value, double error, bool vulkan) {
-      Setting s = setting("reference", value, error);
+    for (const double error : kReferenceErrors) {
+      Setting s = setting("reference", fmt::format("{:g} m", error), error);
       s.cut = make_surface(UniformCut{.error = error, .region = Region::inside(e)});
       s.window = e, s.db = &*reference_, s.points = reference_points_.get(), s.side = kReferenceSide;
-      s.vulkan = vulkan, s.comparable = false;
+      s.comparable = false;
       all.push_back(std::move(s));
-    };
-    for (const double error : kReferenceErrors) add_one(fmt::format("{:g} m", error), error, false);
-    if (device_) add_one("vulkan", kReferenceErrors[1], true);
+    }
     add(all);
     if (frames_drawn_)
       all_.push_back(frame_setting(*reference_, device_, frame_scene(*reference_, e, "", common_.memory),

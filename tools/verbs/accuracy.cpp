@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
 
 #include "db/error.h"
 #include "tools/cli.h"
@@ -93,7 +94,11 @@ void run(const Options& o, const Common& common) {
   const auto surface = make_evaluator(db, x.patches, o.surface, common.memory);
   Area area{.frame = raster.frame(), .width = raster.width, .height = raster.height};
   if (!whole) area.inside = [&](Point p) { return region.contains(p); };
+  std::optional<ProgressBar> bar;
+  bar.emplace(common, "accuracy", 1e-6 * double(raster.width) * raster.height, "Mpx");
+  area.progress = [&](double share) { bar->show(share); };
   const Accuracy a = accuracy_over(*surface, area, db.grids().size());
+  bar.reset();
   if (!o.map.empty()) write_map(*surface, db, raster, o, common);
   common.json ? print(json_of(a, db, raster.step)) : print_text(a, db);
 }

@@ -174,7 +174,8 @@ void add_import(CLI::App& app, Common& common) {
   CLI::App* v = verb(app, common, "import", "add height grids to a database");
   v->add_option("DB", o->database, "the database; made if it is not there")->required();
   v->add_option("FILE", o->files, "height grids in any format that GDAL reads")->required();
-  v->add_option("--accuracy", o->raster.accuracy, "largest error of the grid's surface, metres");
+  v->add_option("--accuracy", o->raster.accuracy, "largest error of the grid's surface, metres")
+      ->check(zero_or_more());
   v->add_option("--name", o->name,
                 "of the grid; else that of the grid it replaces, else the file's name without its ending");
   v->add_option("--replace", o->replace, "a grid of the database that goes out as this one comes in");
@@ -190,7 +191,8 @@ void add_import(CLI::App& app, Common& common) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   v->add_option("--unit", o->raster.unit, "unit of the heights")
       ->check(CLI::IsMember({"m", "ft", "us-ft", "cm"}));
-  v->add_option("--vertical-offset", o->raster.vertical_offset, "metres added to every height");
+  v->add_option("--vertical-offset", o->raster.vertical_offset, "metres added to every height")
+      ->check(finite());
   v->add_flag("--join", o->join, "the files are tiles of one grid");
   v->add_flag("--dry-run", o->dry_run, "say what would change, each file by itself, and keep nothing");
   v->add_flag("--json", common.json, "one JSON document on stdout");

@@ -101,15 +101,20 @@ void run(const Options& o, const Common& common) {
   std::optional<Surface> before;
   if (!o.plane) before.emplace(db, o.before, extent, o.smoothness);
   const Region region = o.region.region();
-  const auto measure = [&](double at_step) {
+  const Raster pixels = Raster::covering(extent, step);
+  std::optional<ProgressBar> bar;
+  bar.emplace(common, "volume", 1.25e-6 * double(pixels.width) * pixels.height, "Mpx");
+  const auto measure = [&](double at_step, double done, double part) {
     const Raster r = Raster::covering(extent, at_step);
     Area area{.frame = r.frame(), .width = r.width, .height = r.height};
+    area.progress = [&, done, part](double share) { bar->show(done + part * share); };
     area.inside = [&](Point p) { return extent.contains(p) && region.contains(p); };
     return before ? volume_between(after.blend(), before->blend(), area)
                   : volume_over_plane(after.blend(), *o.plane, area);
   };
-  const Volume v = measure(step);
-  const double coarser = std::abs(measure(2 * step).net() - v.net());
+  const Volume v = measure(step, 0, 0.8);
+  const double coarser = std::abs(measure(2 * step, 0.8, 0.2).net() - v.net());
+  bar.reset();
   if (common.json)
     return print({{"net", v.net()},
                   {"error", v.error},

@@ -52,7 +52,7 @@ std::vector<std::size_t> CostReport::of(const std::string& knob) const {
   return places;
 }
 
-// On logarithmic axes, scaled to the unit square, the point farthest below the chord between the ends.
+// On logarithmic axes, scaled to the unit square, the point farthest from the chord between the ends.
 void find_knee(CostReport& report) {
   report.knee.reset();
   const std::vector<std::size_t> steps = report.of("error");
@@ -65,7 +65,7 @@ void find_knee(CostReport& report) {
   for (const std::size_t k : steps) {
     const double along = (x(k) - x(first)) / std::max(1e-12, x(last) - x(first)),
                  down = (y(first) - y(k)) / std::max(1e-12, y(first) - y(last));
-    if (down - along > farthest) farthest = down - along, report.knee = k;
+    if (std::abs(down - along) > farthest) farthest = std::abs(down - along), report.knee = k;
   }
 }
 

@@ -31,7 +31,7 @@ constexpr Section kSections[] = {
     {"price", "Time against error",
      "Each step of the ladder three times: at the error that it guarantees, at the largest that was "
      "measured, and at the one that 99 % of the points keep. Bars reach from the fastest to the slowest run "
-     "that counts. The knee is the step farthest below the straight line between the ends: on one side of "
+     "that counts. The knee is the step farthest from the straight line between the ends: on one side of "
      "it less error costs little, on the other much; where time falls by less than a fifth there is none. "
      "Time is that of finding the patches, reading them from the file and evaluating the picture."},
     {"stages", "Where the time goes",

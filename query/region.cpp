@@ -51,8 +51,10 @@ struct Region::Outline {
     }
   }
 
+  // The first one, too, where a polygon is so flat or so high that this is no number.
   std::size_t slab(double y) const {
-    return std::size_t(std::clamp((y - ymin) * slabs_a_metre, 0.0, double(slabs.size() - 1)));
+    const double at = (y - ymin) * slabs_a_metre;
+    return at > 0 ? std::size_t(std::min(at, double(slabs.size() - 1))) : 0;
   }
   bool contains(Point p) const {
     bool inside = false;

@@ -30,7 +30,7 @@ class Region {
   std::shared_ptr<const Outline> outline_;  // of a polygon; none for a rectangle
 };
 
-/// Reads "x y, x y, ..." or WKT of one ring or line. Throws Error(what, ...).
+/// Reads "x y, x y, ..." or WKT of one ring or line, whose heights do not matter. Throws Error(what, ...).
 std::vector<Point> parse_points(const std::string& what, const std::string& text);
 
 }  // namespace patchwork

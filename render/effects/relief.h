@@ -39,9 +39,10 @@ class Relief {
   double step() const { return step_; }  ///< metres
   int width() const { return width_; }   ///< samples
   int height() const { return height_; }
+  /// Metres; without data: kLow.
   std::span<const float> heights() const {
     return {levels_.data(), std::size_t(width_) * std::size_t(height_)};
-  }                      ///< metres; without data: kLow
+  }
   double range() const;  ///< metres: from the lowest to the highest with data
 
   /// Levels of the pyramid of cells: level l has ceil((width - 1) / 2^l) x ceil((height - 1) / 2^l) blocks.

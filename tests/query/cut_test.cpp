@@ -18,9 +18,6 @@
 namespace patchwork {
 namespace {
 
-// PATCHWORK_TRIALS=10000 asks as many cuts as the design does.
-int trials(int standard) { return test_trials(standard); }
-
 class Random {
  public:
   explicit Random(std::uint64_t seed) : random_(seed) {}
@@ -117,11 +114,12 @@ class LodTreeCuts : public testing::TestWithParam<int> {};
 TEST_P(LodTreeCuts, AgreeWithScanningEveryBoxBeforeAndAfterChanges) {
   Random random(test_seed(1));
   std::vector<LodEntry> all;
-  const std::uint64_t boxes = trials(1) >= 10000 ? 100000 : 20000;
+  // PATCHWORK_TRIALS=10000 asks as many cuts as the design does, over as many boxes.
+  const std::uint64_t boxes = test_trials(1) >= 10000 ? 100000 : 20000;
   for (std::uint64_t k = 0; k < boxes; ++k) all.push_back(random_box(random, k));
   LodTree tree = LodTree::build(all);
   std::size_t found = 0, spare = 0;
-  for (int n = 0; n < trials(60); ++n) {
+  for (int n = 0; n < test_trials(60); ++n) {
     expect_no_box_missed(tree, all, *any_cut(random, 3000, GetParam()), found, spare);
     if (n % 3) continue;
     for (int change = 0; change < 30; ++change) {
@@ -184,7 +182,7 @@ Database* CutTest::db_ = nullptr;
 TEST_F(CutTest, ExtractionsAgreeWithScanningEveryPatch) {
   Random random(test_seed(2));
   std::size_t found = 0;
-  for (int n = 0; n < trials(300); ++n) {
+  for (int n = 0; n < test_trials(300); ++n) {
     const auto cut = any_cut(random, 2000, n % 4);
     const bool strict = n % 2;
     const std::vector<PatchId> ids = sorted(extract(*db_, *cut, strict).patches);

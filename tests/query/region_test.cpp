@@ -185,6 +185,17 @@ TEST(Region, APolygonOfManyCornersIsThatOfItsSides) {
   }
 }
 
+// As flat and as high as numbers go: places are found nonetheless.
+TEST(Region, PolygonsOfExtremeHeightsHoldTheirPlaces) {
+  const Region flat = Region::inside(Corners{{0, 0}, {10, 0}, {10, 1e-310}, {0, 1e-310}});
+  EXPECT_TRUE(flat.contains({5, 5e-311}));
+  EXPECT_FALSE(flat.contains({11, 5e-311}));
+  const Region high = Region::inside(Corners{{0, -8e307}, {10, -8e307}, {10, 8e307}, {0, 8e307}});
+  EXPECT_TRUE(high.contains({5, 0}));
+  EXPECT_TRUE(high.contains({5, 7e307}));
+  EXPECT_FALSE(high.contains({11, 0}));
+}
+
 TEST(Region, TextIsReadAsPairsOfCoordinates) {
   const Extent expected{0, -1.5, 20, 30};
   for (const char* text : {"0 -1.5, 20 0, 10 30", "POLYGON((0 -1.5, 20 0, 10 30, 0 -1.5))",

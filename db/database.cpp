@@ -42,8 +42,9 @@ class Window : public CellSource {
 
   const Chunk& chunk_at(int i, int j) {
     const int cx = i / kChunkVertices, cy = j / kChunkVertices;
-    if (!chunk_ || cx != cx_ || cy != cy_) chunk_ = db_.chunk(grid_, level_, cx, cy), cx_ = cx, cy_ = cy;
-    return *chunk_;
+    Held& h = held_[size_t(cy % 2 * 2 + cx % 2)];
+    if (!h.chunk || h.cx != cx || h.cy != cy) h = {db_.chunk(grid_, level_, cx, cy), cx, cy};
+    return *h.chunk;
   }
   // Rows and columns beyond the lattice continue it linearly, as Lattice::extrapolate_ring does.
   void fill(PatchSurface& s, int first_i, int first_j) {
@@ -87,8 +88,12 @@ class Window : public CellSource {
   Database::Impl& db_;
   const GridInfo& grid_;
   int level_;
-  std::shared_ptr<const Chunk> chunk_;
-  int cx_ = -1, cy_ = -1;
+  // A window is smaller than a chunk, so it meets at most four.
+  struct Held {
+    std::shared_ptr<const Chunk> chunk;
+    int cx = 0, cy = 0;
+  };
+  std::array<Held, 4> held_;
 };
 
 }  // namespace
@@ -366,7 +371,7 @@ std::shared_ptr<const PatchSurface> Database::surface(PatchId id) const {
     s->domain = g.info.shape.domain(level, id.bx(), id.by());
     Window window(*impl_, g.info, level);
     window.fill(*s, first_i, first_j);
-    if (patch(id).ragged()) s->holes = make_holes(window, level, id.bx(), id.by());
+    if (g.info.holes && patch(id).ragged()) s->holes = make_holes(window, level, id.bx(), id.by());
     return s;
   });
 }

@@ -19,10 +19,11 @@ class CellMasks {
   bool empty() const { return levels_.empty(); }
   int cols(int level) const { return levels_[size_t(level)].cols; }
   int rows(int level) const { return levels_[size_t(level)].rows; }
-  std::uint8_t at(int level, int i, int j) const {
+  const std::uint8_t* row(int level, int j) const {
     const Level& l = levels_[size_t(level)];
-    return l.cells[size_t(j) * size_t(l.cols) + size_t(i)];
+    return l.cells.data() + size_t(j) * size_t(l.cols);
   }
+  std::uint8_t at(int level, int i, int j) const { return row(level, j)[i]; }
   /// Level-0 cells (1 = valid), (width - 1) x (height - 1), and from them all others.
   static CellMasks from_cells(std::vector<std::uint8_t> cells, const GridShape& shape);
 

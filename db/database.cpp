@@ -64,12 +64,16 @@ class Window : public CellSource {
     continue_along(s.codes.data(), i0 - first_i, i1 - first_i, j0 - first_j, j1 - first_j, 1, n);
     continue_along(s.codes.data(), j0 - first_j, j1 - first_j, 0, n, n, 1);
   }
-  std::uint8_t cell(int i, int j) const override {
-    i = std::clamp(i, 0, grid_.shape.lattice_cols(level_) - 2);
+  void row(int first, int j, std::span<std::uint8_t> out) const override {
+    const int last = grid_.shape.lattice_cols(level_) - 2;
     j = std::clamp(j, 0, grid_.shape.lattice_rows(level_) - 2);
-    const Chunk& c = const_cast<Window*>(this)->chunk_at(i, j);
-    if (c.cells.empty()) return CellMasks::kReal | CellMasks::kAnswering;
-    return c.cells[size_t(j % kChunkVertices) * size_t(c.cols) + size_t(i % kChunkVertices)];
+    for (std::uint8_t& to : out) {
+      const int i = std::clamp(first++, 0, last);
+      const Chunk& c = const_cast<Window*>(this)->chunk_at(i, j);
+      to = c.cells.empty()
+               ? CellMasks::kReal | CellMasks::kAnswering
+               : c.cells[size_t(j % kChunkVertices) * size_t(c.cols) + size_t(i % kChunkVertices)];
+    }
   }
 
  private:

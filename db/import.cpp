@@ -36,9 +36,17 @@ class Stopwatch {
 class MaskCells : public CellSource {
  public:
   MaskCells(const CellMasks& masks, int level) : masks_(masks), level_(level) {}
-  std::uint8_t cell(int i, int j) const override {
+  std::uint8_t cell(int i, int j) const {
     return masks_.at(level_, std::clamp(i, 0, masks_.cols(level_) - 1),
                      std::clamp(j, 0, masks_.rows(level_) - 1));
+  }
+  void row(int i, int j, std::span<std::uint8_t> out) const override {
+    const int n = int(out.size()), cols = masks_.cols(level_);
+    const int first = std::clamp(-i, 0, n), end = std::clamp(cols - i, first, n);
+    std::fill_n(out.begin(), first, cell(0, j));
+    std::copy_n(masks_.row(level_, std::clamp(j, 0, masks_.rows(level_) - 1)) + (i + first), end - first,
+                out.begin() + first);
+    std::fill(out.begin() + end, out.end(), cell(cols - 1, j));
   }
 
  private:

@@ -200,11 +200,14 @@ class Reference {
       return valid_.data() + size_t(std::clamp(int(j), 0, rows - 1) - level0_.first()) * size_t(cols);
     };
     const std::uint8_t *u = mask(std::floor(y)), *v = mask(std::ceil(y));
-    for (int p = p0; p < p1; ++p) {
-      const double x = positions_.at(p);
-      const int i = std::clamp(int(std::floor(x)), 0, cols - 1),
-                k = std::clamp(int(std::ceil(x)), 0, cols - 1);
-      if (!(u[i] && u[k] && v[i] && v[k])) out[p - p0] = std::nan("");
+    const int half = positions_.per - 1;  // positions on either side of a sample's own that are made of it
+    const int i0 = std::clamp((p0 - positions_.first) / positions_.per - 1, 0, cols - 1);
+    const int end = std::clamp((p1 - positions_.first) / positions_.per + 2, 0, cols);
+    for (int i = i0; i < end; ++i) {
+      if (u[i] && v[i]) continue;
+      const int a = i == 0 ? 0 : positions_.place(i) - half;
+      const int b = i == cols - 1 ? positions_.n - 1 : positions_.place(i) + half;
+      for (int p = std::max(a, p0); p <= std::min(b, p1 - 1); ++p) out[p - p0] = std::nan("");
     }
   }
   const Lattice& level0_;
@@ -330,10 +333,13 @@ void PatchErrors::note(int level, int segment, const Positions& positions, int p
   Level& out = levels_[size_t(level)];
   const int across = shape_.blocks_i(level);
   const BlockSpan rows(segment, shape_.blocks_j(level));
+  // Segments share their ends; the first that reaches into the strip may be the one before that of its start.
+  const int start = segments(std::max(0, p0 - positions.first) / positions.per, level) - 2;
   const std::lock_guard lock(mutex_);
-  for (int i = 0; i < out.ni; ++i) {
+  for (int i = std::max(0, start); i < out.ni; ++i) {
     const int a = i == 0 ? 0 : positions.place(segment_start(i, level));
     const int b = std::min(positions.place(segment_start(i + 1, level)), positions.n - 1);
+    if (a >= p1) break;
     double worst = 0, worst_smooth = 0;
     for (int p = std::max(a, p0); p <= std::min(b, p1 - 1); ++p)
       worst = std::max(worst, linear[p - p0]), worst_smooth = std::max(worst_smooth, smooth[p - p0]);

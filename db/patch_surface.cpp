@@ -18,60 +18,107 @@ constexpr int kSplineReach = 3;
 // cell at least.
 int part_a_cell(int level, int feather) { return kFeatherCells / std::max(1, feather >> std::min(level, 8)); }
 
-// Cells of a window and of what can fade it, with the distance of each from those without data.
-class Surroundings {
+// A number of every cell of a window and of what can fade it. A cell more stands around, which nothing
+// changes; rows are as long as vectors like.
+class Plane {
  public:
-  static constexpr int kMargin = kFeatherCells + kSplineReach, kSpan = kSide + 2 * kMargin;
-  Surroundings(const CellSource& cells, int level, int first_i, int first_j) {
-    for (int b = 0; b < kSpan; ++b)
-      for (int a = 0; a < kSpan; ++a) {
-        const auto k = size_t(b * kSpan + a);
-        bits_[k] = cells.cell(first_i - kMargin + a, first_j - kMargin + b);
-        const bool real = bits_[k] & CellMasks::kReal, outside = bits_[k] & CellMasks::kOutside;
-        border_[k] = outside ? 0 : kFeatherCells;
-        hole_[k] = real || outside ? kFeatherCells : 0;
-        whole_ &= real;
-      }
-    if (whole_) return;
-    spread(border_, part_a_cell(level, kFeatherCells));
-    spread(hole_, part_a_cell(level, kHoleFeatherCells));
-  }
-  bool whole() const { return whole_; }
-  std::uint8_t at(int a, int b) const { return bits_[place(a, b)]; }
-  /// 0 for a cell without data, up to kFeatherCells a feather away from any.
-  int far(int a, int b) const { return std::min(border_[place(a, b)], hole_[place(a, b)]); }
-  /// `far` of a vertex: the least of the cells around it.
-  int vertex(int a, int b) const {
-    return std::min({far(a - 1, b - 1), far(a, b - 1), far(a - 1, b), far(a, b)});
-  }
-  /// Nothing that an interpolated weight in this cell reads is faded.
-  bool full_weight(int a, int b) const {
-    for (int y = b - kSplineReach; y <= b + kSplineReach; ++y)
-      for (int x = a - kSplineReach; x <= a + kSplineReach; ++x)
-        if (far(x, y) < kFeatherCells) return false;
-    return true;
+  static constexpr int kMargin = kFeatherCells + kSplineReach, kSpan = kSide + 2 * kMargin, kRow = 64;
+  static_assert(kSpan <= kRow);
+  explicit Plane(std::uint8_t all) { values_.fill(all); }
+
+  /// Rows and columns of the window, -kMargin to kSide + kMargin.
+  std::uint8_t* row(int b) { return values_.data() + (b + kMargin + 1) * kStride + 1 + kMargin; }
+  const std::uint8_t* row(int b) const { return const_cast<Plane*>(this)->row(b); }
+
+  /// to[a] = of(row b, a), all along a row.
+  template <class Of>
+  static void fill_row(std::uint8_t* to, Of of) {
+    for (int a = -kMargin; a < kRow - kMargin; ++a) to[a] = of(a);
   }
 
  private:
-  using Plane = std::array<std::uint8_t, kSpan * kSpan>;
-  static std::size_t place(int a, int b) { return size_t((b + kMargin) * kSpan + a + kMargin); }
-  // Chebyshev distance in two sweeps, `part` a cell.
-  static void spread(Plane& plane, int part) {
-    const auto lower = [&](int a, int b, int da, int db) {
-      const int x = a + da, y = b + db;
-      if (x < 0 || y < 0 || x >= kSpan || y >= kSpan) return;
-      std::uint8_t& here = plane[size_t(b * kSpan + a)];
-      here = std::min<std::uint8_t>(here, std::uint8_t(plane[size_t(y * kSpan + x)] + part));
-    };
-    for (int b = 0; b < kSpan; ++b)
-      for (int a = 0; a < kSpan; ++a)
-        lower(a, b, -1, 0), lower(a, b, -1, -1), lower(a, b, 0, -1), lower(a, b, 1, -1);
-    for (int b = kSpan; b-- > 0;)
-      for (int a = kSpan; a-- > 0;)
-        lower(a, b, 1, 0), lower(a, b, 1, 1), lower(a, b, 0, 1), lower(a, b, -1, 1);
+  static constexpr int kStride = kRow + 2;
+  std::array<std::uint8_t, (kSpan + 2) * kStride> values_;
+};
+
+std::uint8_t lesser(std::uint8_t a, std::uint8_t b) { return a < b ? a : b; }
+
+// Of each cell the least of those from `before` cells before it to `after` cells behind it, along both axes.
+// Nearer than these to the rim of the plane it means nothing.
+Plane least(const Plane& of, int before, int after) {
+  Plane along(kFeatherCells), out(kFeatherCells);
+  const int first = -Plane::kMargin, end = kSide + Plane::kMargin;
+  for (int b = first; b < end; ++b)
+    for (int d = -before; d <= after; ++d) {
+      const std::uint8_t* from = of.row(b) + d;
+      std::uint8_t* to = along.row(b);
+      Plane::fill_row(to, [&](int a) { return lesser(to[a], from[a]); });
+    }
+  for (int b = first + before; b < end - after; ++b)
+    for (int d = -before; d <= after; ++d) {
+      const std::uint8_t* from = along.row(b + d);
+      std::uint8_t* to = out.row(b);
+      Plane::fill_row(to, [&](int a) { return lesser(to[a], from[a]); });
+    }
+  return out;
+}
+
+// Where a plane is 0 it stays so; elsewhere it becomes `part` times the Chebyshev distance from there, in
+// cells, kFeatherCells at most.
+void spread(Plane& plane, int part) {
+  Plane along(kFeatherCells);
+  for (int reached = part; reached < kFeatherCells; reached += part) {
+    for (int b = -Plane::kMargin; b < kSide + Plane::kMargin; ++b) {
+      const std::uint8_t* from = plane.row(b);
+      Plane::fill_row(along.row(b), [&](int a) { return lesser(lesser(from[a - 1], from[a]), from[a + 1]); });
+    }
+    for (int b = -Plane::kMargin; b < kSide + Plane::kMargin; ++b) {
+      const std::uint8_t *above = along.row(b - 1), *here = along.row(b), *below = along.row(b + 1);
+      std::uint8_t* to = plane.row(b);
+      Plane::fill_row(to, [&](int a) {
+        return lesser(to[a], std::uint8_t(lesser(lesser(above[a], here[a]), below[a]) + part));
+      });
+    }
   }
+}
+
+// Cells of a window and of what can fade it, with the distance of each from those without data.
+class Surroundings {
+ public:
+  Surroundings(const CellSource& cells, int level, int first_i, int first_j) {
+    constexpr int m = Plane::kMargin;
+    std::uint8_t common = CellMasks::kReal;
+    for (int b = -m; b < kSide + m; ++b) {
+      std::uint8_t* row = bits_.row(b) - m;
+      cells.row(first_i - m, first_j + b, {row, size_t(Plane::kSpan)});
+      for (int a = 0; a < Plane::kSpan; ++a) common &= row[a];
+    }
+    whole_ = common != 0;
+    if (whole_) return;
+    Plane hole(kFeatherCells);
+    for (int b = -m; b < kSide + m; ++b) {
+      const std::uint8_t* from = bits_.row(b);
+      std::uint8_t *border = far_.row(b), *inside = hole.row(b);
+      for (int a = -m; a < kSide + m; ++a) {
+        const bool real = from[a] & CellMasks::kReal, outside = from[a] & CellMasks::kOutside;
+        border[a] = outside ? 0 : kFeatherCells, inside[a] = real || outside ? kFeatherCells : 0;
+      }
+    }
+    spread(far_, part_a_cell(level, kFeatherCells)), spread(hole, part_a_cell(level, kHoleFeatherCells));
+    for (int b = -m; b < kSide + m; ++b) {
+      std::uint8_t *to = far_.row(b), *inside = hole.row(b);
+      Plane::fill_row(to, [&](int a) { return lesser(to[a], inside[a]); });
+    }
+  }
+  bool whole() const { return whole_; }
+  /// CellMasks::Cell bits.
+  const Plane& bits() const { return bits_; }
+  /// 0 for a cell without data, up to kFeatherCells a feather away from any.
+  const Plane& far() const { return far_; }
+
+ private:
   bool whole_ = true;
-  Plane bits_, border_, hole_;
+  Plane bits_{0}, far_{kFeatherCells};
 };
 
 struct CellRect {
@@ -104,25 +151,28 @@ std::unique_ptr<const PatchSurface::Holes> make_holes(const CellSource& cells, i
                             by * kKernelCells - kExtensionCells - 1);
   if (around.whole()) return nullptr;
   auto holes = std::make_unique<PatchSurface::Holes>();
-  for (int b = 0; b < kSide; ++b)
+  const Plane near = least(around.far(), 1, 0),
+              wide = least(near, 1, 1);  // a vertex has four cells around it
+  for (int b = 0; b < kSide; ++b) {
+    const auto k = size_t(b * kSide);
+    const std::uint8_t* bits = around.bits().row(b);
     for (int a = 0; a < kSide; ++a) {
-      const auto k = size_t(b * kSide + a);
-      holes->answering[k] = (around.at(a, b) & CellMasks::kAnswering) != 0;
-      holes->real[k] = (around.at(a, b) & CellMasks::kReal) != 0;
-      holes->near[k] = std::uint8_t(around.vertex(a, b));
-      int wide = kFeatherCells;
-      for (int y = b - 1; y <= b + 1; ++y)
-        for (int x = a - 1; x <= a + 1; ++x) wide = std::min(wide, around.vertex(x, y));
-      holes->wide[k] = std::uint8_t(wide);
+      holes->answering[k + size_t(a)] = (bits[a] & CellMasks::kAnswering) != 0;
+      holes->real[k + size_t(a)] = (bits[a] & CellMasks::kReal) != 0;
     }
+    std::copy_n(near.row(b), kSide, holes->near.begin() + long(k));
+    std::copy_n(wide.row(b), kSide, holes->wide.begin() + long(k));
+  }
   return holes;
 }
 
 Offer make_offer(const CellSource& cells, int level, int bx, int by) {
   std::array<std::array<bool, kKernelCells>, kKernelCells> free;
   const Surroundings around(cells, level, bx * kKernelCells, by * kKernelCells);
+  // Nothing that an interpolated weight in such a cell reads is faded.
+  const Plane read = least(around.far(), kSplineReach, kSplineReach);
   for (int j = 0; j < kKernelCells; ++j)
-    for (int i = 0; i < kKernelCells; ++i) free[size_t(j)][size_t(i)] = around.full_weight(i, j);
+    for (int i = 0; i < kKernelCells; ++i) free[size_t(j)][size_t(i)] = read.row(j)[i] == kFeatherCells;
   Offer offer;
   while (offer.count < offer.cells.size()) {
     const CellRect r = largest_rectangle(free);

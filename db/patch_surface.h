@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "db/grid.h"
 
@@ -35,12 +36,12 @@ struct PatchSurface {
   std::unique_ptr<const Holes> holes;  ///< null for a patch without
 };
 
-/// Cells of one level, asked by lattice index; true if real / answering. Indices beyond the grid mean its
-/// border cell.
+/// Cells of one level, asked by lattice index. Indices beyond the grid mean its border cell.
 class CellSource {
  public:
   virtual ~CellSource() = default;
-  virtual std::uint8_t cell(int i, int j) const = 0;  ///< CellMasks::Cell bits
+  /// CellMasks::Cell bits of cells (i, j), (i + 1, j) ...
+  virtual void row(int i, int j, std::span<std::uint8_t> out) const = 0;
 };
 
 /// The holes of the window of block (bx, by); null if no hole is in it or near enough to fade it.

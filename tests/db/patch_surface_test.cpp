@@ -63,7 +63,10 @@ class RandomCells : public CellSource {
     std::bernoulli_distribution hole(missing);
     for (std::uint8_t& b : bits_) b = hole(random) ? kBroken[random() % 4] : kWhole;
   }
-  std::uint8_t cell(int i, int j) const override {
+  void row(int i, int j, std::span<std::uint8_t> out) const override {
+    for (std::uint8_t& c : out) c = cell(i++, j);
+  }
+  std::uint8_t cell(int i, int j) const {
     return i < -kFrom || j < -kFrom || i >= kSpan - kFrom || j >= kSpan - kFrom
                ? kWhole
                : bits_[size_t((j + kFrom) * kSpan + i + kFrom)];

@@ -2,6 +2,7 @@
 // not.
 #include <gtest/gtest.h>
 
+#include "blend/weight.h"
 #include "tests/blend/scene.h"
 #include "tests/hard_case.h"
 
@@ -61,6 +62,15 @@ void add_edges(const Grid& g, const LatticeRect& r, std::mt19937_64& random, std
     out.push_back({f.to_domain(r.i0 + part(random) * (r.i1 - r.i0), j), along_j});
 }
 
+// A corner, across both diagonals.
+void add_corner(const Grid& g, double i, double j, std::vector<Crossing>& out) {
+  const Frame& f = g.info.frame;
+  const auto& n = f.numbers();
+  const double si = std::sqrt(2) * f.step_i(), sj = std::sqrt(2) * f.step_j();
+  for (const double sign : {1.0, -1.0})
+    out.push_back({f.to_domain(i, j), {n[1] / si + sign * n[2] / sj, n[4] / si + sign * n[5] / sj}});
+}
+
 // Where two grids both end and none lies below, each speaks for its last, extrapolated half cell alone.
 bool only_rims_meet(const Database& db, Point p) {
   int reached = 0;
@@ -98,6 +108,21 @@ class ContinuityCk : public ::testing::TestWithParam<BlendOptions> {
         add_edges(g, shape.kernel(id.level(), id.bx(), id.by()), random, all);
         add_edges(g, shape.domain(id.level(), id.bx(), id.by()), random, all);
       }
+    }
+    std::erase_if(all, [](const Crossing& c) { return only_rims_meet(db(), c.at); });
+    return all;
+  }
+  // Corners of kernels and of domains, and halfway between them, where ramps along both axes are alike.
+  static std::vector<Crossing> corners(double error) {
+    std::vector<Crossing> all;
+    for (const PatchId id : extract(db(), {.error = error}).patches) {
+      const Grid& g = db().grid(id.grid());
+      const LatticeRect k = g.info.shape.kernel(id.level(), id.bx(), id.by());
+      const LatticeRect d = g.info.shape.domain(id.level(), id.bx(), id.by());
+      for (const double part : {0.0, 0.5, 1.0})
+        for (const auto& [ki, di] : {std::pair{k.i0, d.i0}, {k.i1, d.i1}})
+          for (const auto& [kj, dj] : {std::pair{k.j0, d.j0}, {k.j1, d.j1}})
+            add_corner(g, ki + part * (di - ki), kj + part * (dj - kj), all);
     }
     std::erase_if(all, [](const Crossing& c) { return only_rims_meet(db(), c.at); });
     return all;
@@ -155,6 +180,37 @@ TEST_P(ContinuityCk, AcrossKernelRimsDomainRimsAndLevels) {
 TEST_P(ContinuityCk, AcrossTheCellsAroundAHole) {
   const std::vector<Crossing> cells = cells_around_the_hole();
   expect_continuous({0, 12, 25}, {cells, cells, cells});
+}
+
+TEST_P(ContinuityCk, AcrossCornersOfKernelsAndDomainsAndBetweenThem) {
+  const std::vector<double> errors{0, 3, 15};
+  std::vector<std::vector<Crossing>> at;
+  for (const double error : errors) at.push_back(corners(error));
+  expect_continuous(errors, at);
+}
+
+TEST_P(ContinuityCk, AcrossTheVerticesAroundAHole) {
+  std::vector<Crossing> vertices;
+  for (int j = 19; j < 35; ++j)
+    for (int i = 29; i < 52; ++i) add_corner(db().grids()[1], i, j, vertices);
+  expect_continuous({0, 12, 25}, {vertices, vertices, vertices});
+}
+
+// The naive form of a weight over a corner, the smaller of two ramps: continuous across every edge, it has a
+// crease where they are equal. Slopes away from s = t = 1/2 on either side add up to the jump: of the product
+// 2 h w'' with w'' = -2 S'^2, of the smaller -2 S' whatever the step.
+TEST(ContinuityCkOfWeights, TheSmallerOfTwoRampsHasACreaseInTheCorner) {
+  const auto jump = [](auto weight, double h) {
+    const auto slope = [&](double side) {
+      const double near = 0.5 * side * h, far = 1.5 * side * h;
+      return (weight(0.5 + far, 0.5 - far) - weight(0.5 + near, 0.5 - near)) / h;
+    };
+    return std::abs(slope(1) + slope(-1));
+  };
+  const auto product = [](double s, double t) { return smoothstep<2>(s) * smoothstep<2>(t); };
+  const auto smaller = [](double s, double t) { return std::min(smoothstep<2>(s), smoothstep<2>(t)); };
+  EXPECT_LT(jump(product, 0.005), kFalls * jump(product, 0.02));
+  EXPECT_GT(jump(smaller, 0.005), 0.7 * jump(smaller, 0.02)) << "negative control";
 }
 
 // Patches of several levels side by side in the extrapolated half cell around a grid, where nothing else

@@ -240,28 +240,86 @@ TEST_F(GrazingRays, MissNothingThatDenseMarchingSees) {
   EXPECT_GT(missed_by_steps, 0u) << "negative control: steps of 3 m miss ridges";
 }
 
-TEST_F(GrazingRays, HitWhereTheSurfaceFirstRisesAboveThem) {
-  const Extraction x = extract(db(), {.error = 0});
-  const SightLines lines(db(), x.patches, {});
-  Rays rays(db(), lines.surface(), test_seed(12));
-  std::vector<SightRay> some;
-  for (int k = 0; k < 500; ++k) some.push_back(rays.next());
-  const std::vector<Sight> found = lines.find(some, kFlat);
-  std::size_t hits = 0;
-  for (std::size_t k = 0; k < some.size(); ++k) {
-    const Sight& s = found[k];
-    const SightRay& r = some[k];
-    if (std::isfinite(s.clearance)) {
-      const double t = s.nearest_distance / std::hypot(r.to.x - r.from.x, r.to.y - r.from.y);
-      const double z = r.from.z + t * (r.to.z - r.from.z);
-      EXPECT_NEAR(z - s.nearest.z, s.clearance, 1e-6);
-      EXPECT_NEAR(height_at(lines.surface(), {s.nearest.x, s.nearest.y}), s.nearest.z, 1e-6);
+struct Told {
+  double height = NAN, bound = NAN;
+};
+Told told_at(const Blend& surface, double x, double y) {
+  Told t;
+  surface.at_points(
+      std::span(&x, 1), std::span(&y, 1),
+      {.height = std::span(&t.height, 1), .bound = std::span(&t.bound, 1), .source = {}, .patch = {}});
+  return t;
+}
+
+// The other side of the march: what is reported is there. A clearance that is too small, a hit where nothing
+// is or a verdict without a witness would all pass it.
+TEST_F(GrazingRays, ReportNothingThatIsNotThere) {
+  const std::uint64_t seed = test_seed(12);
+  std::size_t tries = 0, hits = 0, hidden = 0, visible = 0, undecided = 0, shallow = 0;
+  for (const double error : {0.0, 4.0})
+    for (const BlendOptions& options : all_blends()) {
+      const Extraction x = extract(db(), {.error = error});
+      const SightLines lines(db(), x.patches, options);
+      double least = INFINITY, largest = 0;  // of the bounds that there can be
+      for (const PatchId id : x.patches) {
+        const double e = db().patch(id).error[std::size_t(options.smoothness)];
+        least = std::min(least, e), largest = std::max(largest, e + db().grid(id.grid()).info.rim_error);
+      }
+      Rays rays(db(), lines.surface(), seed + std::uint64_t(error));
+      std::vector<SightRay> some;
+      for (int k = 0; k < 50; ++k) some.push_back(rays.next());
+      const Air air{.curved = options.smoothness == 1, .refraction = 0.13, .radius = 5e4};
+      const std::vector<Sight> found = lines.find(some, air);
+      for (std::size_t k = 0; k < some.size(); ++k) {
+        const Sight& s = found[k];
+        const SightRay& r = some[k];
+        const double dx = r.to.x - r.from.x, dy = r.to.y - r.from.y, ground = std::hypot(dx, dy);
+        const auto z_at = [&](double t) {
+          return r.from.z + t * (r.to.z - r.from.z) - t * (1 - t) * drop(ground, air);
+        };
+        SCOPED_TRACE(name_of(options) + " error " + std::to_string(error) + " ray " + std::to_string(k));
+        ++tries;
+        hidden += s.verdict == Verdict::hidden, visible += s.verdict == Verdict::visible;
+        undecided += s.verdict == Verdict::undecided;
+        if (std::isfinite(s.clearance)) {
+          const Told there = told_at(lines.surface(), s.nearest.x, s.nearest.y);
+          EXPECT_NEAR(there.height, s.nearest.z, 1e-6);
+          EXPECT_NEAR(there.bound, s.nearest_bound, 1e-9);
+          EXPECT_NEAR(z_at(s.nearest_distance / ground) - s.nearest.z, s.clearance, 1e-6);
+          if (s.verdict == Verdict::visible) {
+            EXPECT_LE(s.nearest_bound - s.clearance, 1e-6);
+          } else {
+            EXPECT_LT(s.clearance, largest) << "no bound reaches the ray";
+          }
+          if (s.verdict != Verdict::hidden) {
+            EXPECT_LE(-s.clearance - s.nearest_bound, 1e-6);
+          }
+        } else {
+          EXPECT_EQ(s.verdict, Verdict::visible);
+        }
+        if (s.verdict == Verdict::hidden) {
+          EXPECT_TRUE(s.blocked);
+          EXPECT_GT(-s.clearance, least - 1e-9) << "no bound is small enough to be sure";
+        }
+        if (!s.blocked) continue;
+        ++hits, shallow += -s.clearance <= least;
+        EXPECT_NE(s.verdict, Verdict::visible);
+        const Told at = told_at(lines.surface(), s.hit.x, s.hit.y);
+        EXPECT_GE(at.height, s.hit.z);
+        EXPECT_EQ(at.bound, s.hit_bound);
+        EXPECT_NEAR(z_at(s.hit_distance / ground), s.hit.z, 1e-6);
+        const double before = s.hit_distance - 1.5e-3;
+        if (before <= 0) continue;
+        const double t = before / ground;
+        const Told earlier = told_at(lines.surface(), r.from.x + t * dx, r.from.y + t * dy);
+        EXPECT_FALSE(earlier.height - z_at(t) > SightLines::kClearance)
+            << "it rises before " << s.hit_distance;
+      }
     }
-    if (!s.blocked) continue;
-    ++hits;
-    EXPECT_GE(height_at(lines.surface(), {s.hit.x, s.hit.y}), s.hit.z) << "ray " << k;
-  }
   EXPECT_GT(hits, 50u);
+  EXPECT_GT(std::min({hidden, visible, undecided}), 0u);
+  EXPECT_GT(shallow, 0u) << "negative control: to take every blocked ray for hidden would be seen";
+  report_law("GrazingRays", "what is reported is there: clearances, hits, verdicts, every blend", tries);
 }
 
 // A pit far below a ray, surveyed finely, in a plain of large cells: the plain is not one parabola across it.
@@ -356,13 +414,21 @@ TEST_F(LevelPlain, HidesWhatIsBeyondTheHorizon) {
 }
 
 TEST_F(LevelPlain, JudgesByItsBoundAndNotByItsHeightsAlone) {
-  const auto verdict = [&](double above) {
-    return look({{0, 0, 50 + above}, {900, 20, 50 + above}}, kFlat).verdict;
-  };
-  EXPECT_EQ(verdict(1), Verdict::visible);
-  EXPECT_EQ(verdict(0.3), Verdict::undecided);
-  EXPECT_EQ(verdict(-0.3), Verdict::undecided);
-  EXPECT_EQ(verdict(-1), Verdict::hidden);
+  const Extraction x = extract(land_.db(), {.error = 0});
+  for (const BlendOptions& options : all_blends()) {
+    const SightLines lines(land_.db(), x.patches, options);
+    for (const double above : {1.0, 0.55, 0.45, 0.3, -0.3, -0.45, -0.55, -1.0}) {
+      const SightRay ray{{0, 0, 50 + above}, {900, 20, 50 + above}};
+      const Sight s = lines.find({&ray, 1}, kFlat)[0];
+      const Verdict expected = above > 0.5    ? Verdict::visible
+                               : above < -0.5 ? Verdict::hidden
+                                              : Verdict::undecided;
+      EXPECT_EQ(s.verdict, expected) << name_of(options) << " " << above;
+      EXPECT_EQ(s.blocked, above < 0) << name_of(options) << " " << above;
+      EXPECT_NEAR(s.clearance, above, 1e-9) << name_of(options);
+      EXPECT_NEAR(s.nearest_bound, 0.5, 1e-9) << name_of(options);
+    }
+  }
 }
 
 TEST_F(LevelPlain, IsNotThereBeyondItsGrids) {

@@ -12,6 +12,7 @@
 #include "tests/db/databases.h"
 #include "tests/db/model.h"
 #include "tests/grids.h"
+#include "tests/hard_case.h"
 #include "tests/seed.h"
 
 namespace patchwork {
@@ -167,6 +168,60 @@ TEST(Invariant, RedundantPatchesAreKeptDormantAndLeaveTheTree) {
                      [&](const LodTree::Entry& e) { in_tree += !db.patch(e.id).dormant(); });
   EXPECT_EQ(in_tree, count_live(db)) << "the tree holds the live patches and no other";
   EXPECT_EQ(db.tree().find_violation(), "");
+}
+
+// A flat square of `side` samples: vertex (0, 0) at (i, j) of a lattice with these axes (metres) that begins
+// 1e7 m from the origin, its steps `part` of that lattice's. All numbers are dyadic: nothing is rounded.
+GridFile flat_square(const std::array<double, 4>& axes, int side, double i, double j, double part,
+                     double accuracy) {
+  const double x = 1e7 + axes[0] * (i - part / 2) + axes[1] * (j - part / 2);
+  const double y = -1e7 + axes[2] * (i - part / 2) + axes[3] * (j - part / 2);
+  return {.width = side,
+          .height = side,
+          .geotransform = {x, part * axes[0], part * axes[1], y, part * axes[2], part * axes[3]},
+          .accuracy = accuracy,
+          .at = [](int, int) { return 7.0; }};
+}
+
+// A worse survey across the seam of two better ones, whose kernels end `gap` of their own cells before each
+// other. Both are grown by 1/1024 of their cell, so 1/512 is the widest gap that is none.
+TEST(CoverageSliver, KernelsOfTwoSurveysGrowByAPartOfTheirOwnCells) {
+  struct Case {
+    std::array<double, 4> axes;
+    int side, level;  // level: of the one block that covers
+  };
+  std::uint64_t tries = 0;
+  for (const auto& [axes, side, level] : {Case{{30, 0, 0, -30}, 36, 0}, Case{{24, 18, 18, -24}, 45, 1}}) {
+    const GridFolder folder;
+    Database db = folder.database();
+    const GridShape shape(side, side, true);
+    const LatticeRect core = shape.core();
+    ASSERT_EQ(shape.levels(), level + 1);
+    folder.add(db, flat_square(axes, side, 0, 0, 1, 0.1), "west");
+    // Its kernel [7.5, 27.5] is 20/8 of these cells wide; the seam is its middle.
+    folder.add(db, flat_square(axes, 36, core.i1 - 17.5 / 8, 14, 0.125, 5), "target");
+    int open = 0;
+    for (const auto& [gap, closed] :
+         {std::pair{1.0 / 2048, true}, {1.0 / 512, true}, {1.0 / 512 + 0x1p-20, false}, {1.0 / 256, false}}) {
+      folder.add(db, flat_square(axes, side, core.i1 - core.i0 + std::ldexp(gap, level), 0, 1, 0.1), "east");
+      const Grid &west = grid_named(db, "west"), &east = grid_named(db, "east"),
+                 &target = grid_named(db, "target");
+      const PatchRecord p = target.patches[0];
+      const double bottom = west.at(level, 0, 0).bottom;
+      EXPECT_EQ(p.top, closed ? bottom : model::kInfinity) << "level " << level << " gap " << gap;
+      EXPECT_EQ(p.dormant(), closed) << "level " << level << " gap " << gap;
+      EXPECT_EQ(p.best(), !closed) << "level " << level << " gap " << gap;
+      const std::vector<OrientedRect> plain{{&west.info.frame, shape.kernel(level, 0, 0)},
+                                            {&east.info.frame, shape.kernel(level, 0, 0)}};
+      CoverageCounts counts;
+      open += !covered({&target.info.frame, target.info.shape.kernel(0, 0, 0)}, plain, counts);
+      ++tries;
+      db.remove("east");
+      EXPECT_FALSE(grid_named(db, "target").patches[0].dormant()) << "one half alone";
+    }
+    EXPECT_EQ(open, 4) << "negative control: without growth every gap is one";
+  }
+  report_law("CoverageSliver", "seams of two surveys in a database, 1e7 m from the origin", tries);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "db/database.h"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -393,17 +394,20 @@ void Database::read_samples(GridId id, int row, int rows, std::span<double> out)
   const GridInfo& g = grid(id).info;
   const int width = g.shape.width();
   const double raw_quantum = g.quantum / g.raw_scale;  // exact: a power of two where storage is lossless
-  for (int j = row; j < row + rows; ++j)
-    for (int i = 0; i < width;) {
-      const auto c = impl_->chunk(g, 0, i / kChunkVertices, j / kChunkVertices);
-      const int first = i / kChunkVertices * kChunkVertices, end = std::min(width, first + kChunkVertices);
-      for (; i < end; ++i) {
+  // Column by column of chunks: each is decoded once, however wide the grid.
+  tbb::parallel_for(0, (width + kChunkVertices - 1) / kChunkVertices, [&](int cx) {
+    const int first = cx * kChunkVertices, end = std::min(width, first + kChunkVertices);
+    std::shared_ptr<const Chunk> c;
+    for (int j = row; j < row + rows; ++j) {
+      if (!c || j % kChunkVertices == 0) c = impl_->chunk(g, 0, cx, j / kChunkVertices);
+      for (int i = first; i < end; ++i) {
         const auto at = size_t(j % kChunkVertices) * size_t(c->cols) + size_t(i - first);
         const bool valid = c->cells.empty() || (c->cells[at] & CellMasks::kVertex);
         out[size_t(j - row) * size_t(width) + size_t(i)] =
             valid ? raw_quantum * (double(g.code_origin) + c->codes[at]) : std::nan("");
       }
     }
+  });
 }
 
 }  // namespace patchwork

@@ -8,13 +8,14 @@
 #include <vector>
 
 #include "db/error.h"
+#include "db/threads.h"
 #include "tools/output_file.h"
 
 namespace patchwork {
 
 namespace {
 
-constexpr int kRows = 256;
+constexpr int kRows = 2 * kChunkVertices;
 
 struct Range {
   double low = INFINITY, high = -INFINITY;
@@ -28,7 +29,10 @@ class SampleWriter {
 
   std::string write(const std::string& path) {
     GDALAllRegister();
-    each_strip(0, [&](int, std::span<const double> strip) { note(strip); });
+    // Only holes and bytes, which may turn out to be signed, ask for all samples beforehand.
+    const bool twice = grid_.holes || grid_.sample_type == GDALGetDataTypeName(GDT_Byte);
+    if (twice) each_strip(0, 0.5, [&](int, std::span<const double> strip) { note(strip); });
+    from_ = twice ? 0.5 : 0;
     choose();
     OutputFile file(path);
     fill(path, file.name());
@@ -41,14 +45,14 @@ class SampleWriter {
   int height() const { return grid_.shape.height(); }
 
   template <class Visit>
-  void each_strip(double from, Visit visit) {
+  void each_strip(double from, double to, Visit visit) {
     std::vector<double> strip(size_t(kRows) * size_t(width()));
     for (int row = 0; row < height(); row += kRows) {
       const int rows = std::min(kRows, height() - row);
       const std::span<double> samples(strip.data(), size_t(rows) * size_t(width()));
       db_.read_samples(grid_.id, row, rows, samples);
       visit(row, samples);
-      if (progress_) progress_(from + 0.5 * double(row + rows) / height());
+      if (progress_) progress_(from + (to - from) * double(row + rows) / height());
     }
   }
   void note(std::span<const double> strip) {
@@ -87,6 +91,7 @@ class SampleWriter {
     options.SetNameValue("TILED", "YES").SetNameValue("COMPRESS", "DEFLATE");
     options.SetNameValue("PREDICTOR", GDALDataTypeIsInteger(type_) ? "2" : "3");
     options.SetNameValue("BIGTIFF", "IF_SAFER");
+    options.SetNameValue("NUM_THREADS", std::to_string(allowed_threads()).c_str());
     const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
     GDALDatasetUniquePtr out(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
         name.c_str(), width(), height(), 1, type_, options.List()));
@@ -94,7 +99,7 @@ class SampleWriter {
     if (good) {
       describe(*out);
       GDALRasterBand& band = *out->GetRasterBand(1);
-      each_strip(0.5, [&](int row, std::span<const double> strip) {
+      each_strip(from_, 1, [&](int row, std::span<const double> strip) {
         std::vector<double> values(strip.begin(), strip.end());
         for (double& v : values)
           if (std::isnan(v)) v = *nodata_;
@@ -126,6 +131,7 @@ class SampleWriter {
   const GridInfo& grid_;
   const std::function<void(double)>& progress_;
   Range range_;
+  double from_ = 0;  // the share that is done when writing begins
   GDALDataType type_ = GDT_Unknown;
   std::optional<double> nodata_;
 };

@@ -2,7 +2,6 @@
 
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>
-#include <oneapi/tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include <memory>
 
 #include "db/error.h"
+#include "db/threads.h"
 #include "tools/output_file.h"
 
 // The surface is shown to GDAL as a dataset with overviews whose pixels are made when they are read; its COG
@@ -263,9 +263,7 @@ CPLStringList creation_options(const SurfaceRaster& raster) {
   options.SetNameValue("OVERVIEW_COMPRESS", raster.compression.c_str());
   options.SetNameValue("BLOCKSIZE", std::to_string(kTile).c_str());
   options.SetNameValue("BIGTIFF", "IF_SAFER");
-  using Threads = oneapi::tbb::global_control;  // those that --threads leaves
-  options.SetNameValue("NUM_THREADS",
-                       std::to_string(Threads::active_value(Threads::max_allowed_parallelism)).c_str());
+  options.SetNameValue("NUM_THREADS", std::to_string(allowed_threads()).c_str());
   options.SetNameValue("OVERVIEWS", "FORCE_USE_EXISTING");
   // Level 1: on 4096 x 4096 pixels of Puget Sound level 6 takes twice the time for 3 % (DEFLATE) or 12 %
   // (ZSTD) fewer bytes.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 namespace patchwork {
 
@@ -11,7 +12,11 @@ namespace {
 // Bounds by size, in steps of 1/70 octave (1 %) from a micrometre on.
 class Histogram {
  public:
-  void add(double bound) { ++counts_[place(bound)], ++all_; }
+  // Within a patch bounds are alike, so the last place is most often the next.
+  void add(double bound) {
+    if (bound != last_) last_ = bound, at_ = place(bound);
+    ++counts_[at_], ++all_;
+  }
   /// The upper end of the step that holds the share; no more than `most`.
   double quantile(double share, double most) const {
     std::size_t seen = 0;
@@ -28,18 +33,19 @@ class Histogram {
     return std::min(std::size_t(std::ceil(octaves * kSteps)), std::size_t{3999});
   }
   std::array<std::size_t, 4000> counts_{};
-  std::size_t all_ = 0;
+  std::size_t all_ = 0, at_ = 0;
+  double last_ = NAN;
 };
 
 }  // namespace
 
 Accuracy accuracy_over(const Evaluator& surface, const Area& area, std::size_t grids) {
   Accuracy a;
-  a.by_source.resize(grids);
+  std::vector<std::size_t> by_source(grids);
   Histogram histogram;
   double sum = 0;
   std::size_t answered = 0, missing = 0, filled = 0;
-  scan_area(surface, area, [&](const AreaRow& row) {
+  scan_area(surface, nullptr, area, [&](const AreaRow& row) {
     for (int c = 0; c < area.width; ++c) {
       const Point at = area.centre(c, row.row);
       if (area.inside && !area.inside(at)) continue;
@@ -50,13 +56,14 @@ Accuracy accuracy_over(const Evaluator& surface, const Area& area, std::size_t g
         continue;
       }
       ++answered, filled += source < 0, sum += bound, histogram.add(bound);
-      a.by_source[std::size_t(std::abs(source)) - 1] += area.pixel();
+      ++by_source[std::size_t(std::abs(source)) - 1];
       if (!(bound >= a.best.bound)) a.best = {bound, at};
       if (!(bound <= a.worst.bound)) a.worst = {bound, at};
     }
   });
   a.answered = double(answered) * area.pixel(), a.missing = double(missing) * area.pixel();
   a.filled = double(filled) * area.pixel();
+  for (const std::size_t pixels : by_source) a.by_source.push_back(double(pixels) * area.pixel());
   if (answered == 0) return a;
   a.mean = sum / double(answered);
   a.median = histogram.quantile(0.5, a.worst.bound), a.p95 = histogram.quantile(0.95, a.worst.bound);

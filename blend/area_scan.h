@@ -24,11 +24,13 @@ struct Area {
 /// Rows that are evaluated together.
 struct AreaRow {
   int row = 0;
-  std::span<const double> height, bound;  ///< metres; NaN where there is no data
-  std::span<const std::int32_t> source;   ///< as in BlendOutput
+  std::span<const double> height, bound;              ///< metres; NaN where there is no data
+  std::span<const std::int32_t> source;               ///< as in BlendOutput
+  std::span<const double> other_height, other_bound;  ///< of the other surface, if there is one
 };
 
-/// Calls visit(row) for each row of the area, from the first on.
-void scan_area(const Evaluator& surface, const Area& area, const std::function<void(const AreaRow&)>& visit);
+/// Calls visit(row) for each row of the area, from the first on. `other` may be null.
+void scan_area(const Evaluator& surface, const Evaluator* other, const Area& area,
+               const std::function<void(const AreaRow&)>& visit);
 
 }  // namespace patchwork

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "db/basis.h"
 
@@ -50,7 +51,12 @@ LatticeRect HeightTree::block(int i, int j) {
 HeightTree::HeightTree(const Database& db, const std::vector<Blend::Placed>& placed, int smoothness)
     : highest_(placed.size()) {
   std::vector<float> top(placed.size());
-  tbb::parallel_for(std::size_t{0}, placed.size(), [&](std::size_t k) {
+  std::vector<std::size_t> by_place(placed.size());  // neighbours are cut from the same chunks
+  std::iota(by_place.begin(), by_place.end(), std::size_t{0});
+  std::sort(by_place.begin(), by_place.end(),
+            [&](std::size_t a, std::size_t b) { return placed[a].id < placed[b].id; });
+  tbb::parallel_for(std::size_t{0}, placed.size(), [&](std::size_t n) {
+    const std::size_t k = by_place[n];
     const Blend::Placed& p = placed[k];
     const auto surface = db.surface(p.id);
     Blocks& blocks = highest_[k];

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace patchwork {
 
@@ -67,13 +66,10 @@ class Sums {
 
 Volume volume_between(const Evaluator& surface, const Evaluator& other, const Area& area) {
   Sums sums;
-  std::vector<double> height(std::size_t(std::max(area.width, 0))), bound(height.size());
-  scan_area(surface, area, [&](const AreaRow& row) {
-    other.at_pixels(area.frame, area.width, row.row, 1,
-                    {.height = height, .bound = bound, .source = {}, .patch = {}});
-    for (std::size_t c = 0; c < height.size(); ++c)
+  scan_area(surface, &other, area, [&](const AreaRow& row) {
+    for (std::size_t c = 0; c < row.height.size(); ++c)
       if (!area.inside || area.inside(area.centre(int(c), row.row)))
-        sums.add(row.height[c] - height[c], row.bound[c] + bound[c]);
+        sums.add(row.height[c] - row.other_height[c], row.bound[c] + row.other_bound[c]);
   });
   return sums.times(area.pixel());
 }

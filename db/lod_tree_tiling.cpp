@@ -1,5 +1,7 @@
 #include "db/lod_tree_tiling.h"
 
+#include <oneapi/tbb/parallel_invoke.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -43,18 +45,26 @@ class Tiling {
   }
 
   using Done = std::function<void(std::span<const std::uint32_t>)>;
-  void split(std::size_t pages, const Done& done) { split(std::span<Tile>(tiles_), pages, done); }
+  void split(std::size_t pages, const Done& done) {
+    std::vector<std::span<const Tile>> parts(pages);
+    split(std::span<Tile>(tiles_), std::span(parts));
+    std::vector<std::uint32_t> part;
+    for (const std::span<const Tile> tiles : parts) {
+      part.clear();
+      for (const Tile& t : tiles) part.push_back(t.index);
+      done(part);
+    }
+  }
 
  private:
+  static constexpr std::size_t kWorthAThread = 4096;  // tiles
   // Greedy from the top (Garcia, Lopez and Leutenegger 1998, "A greedy algorithm for bulk loading R-trees"),
   // with a cost that knows cuts: of the ways to part the tiles in two, along each key and at each of three
   // shares, the one whose parts cost least.
-  void split(std::span<Tile> tiles, std::size_t pages, const Done& done) {
-    if (pages <= 1) {
-      part_.clear();
-      for (const Tile& t : tiles) part_.push_back(t.index);
-      return done(part_);
-    }
+  void split(std::span<Tile> tiles, std::span<std::span<const Tile>> parts) const {
+    const std::size_t pages = parts.size();
+    if (pages == 1) parts[0] = tiles;
+    if (pages <= 1) return;
     double least = INFINITY;
     std::size_t key = 0, first = pages / 2;  // where no cost is a number
     for (std::size_t k = 0; k < Tile::kKeys; ++k)
@@ -67,8 +77,12 @@ class Tiling {
         if (pages == 2) break;
       }
     const std::size_t cut = part_by(tiles, key, first, pages);
-    split(tiles.first(cut), first, done);
-    split(tiles.subspan(cut), pages - first, done);
+    const auto one = [&] { split(tiles.first(cut), parts.first(first)); };
+    const auto other = [&] { split(tiles.subspan(cut), parts.subspan(first)); };
+    if (tiles.size() < kWorthAThread)
+      one(), other();
+    else
+      tbb::parallel_invoke(one, other);
   }
 
   // The tiles of the first `part` pages of `pages`, by a key, to the front; returns how many.
@@ -102,7 +116,6 @@ class Tiling {
   }
 
   std::vector<Tile> tiles_;
-  std::vector<std::uint32_t> part_;
   double width_ = 0, height_ = 0;                  // metres, of all boxes
   float lowest_ = INFINITY, highest_ = -INFINITY;  // octaves: of the tops, of finite ones
 };

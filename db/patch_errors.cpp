@@ -61,11 +61,14 @@ struct Phase {  // of every position of a strip on one level's lattice
 };
 
 Phase make_phase(const Positions& positions, int p0, int p1, int level) {
-  Phase phase;
-  for (int p = p0; p < p1; ++p) {
-    const double u = std::ldexp(positions.at(p), -level), cell = std::floor(u);
-    phase.cell.push_back(int(cell)), phase.t.push_back(u - cell);
-    phase.cubic.push_back(cell_weights<1>(u - cell)), phase.quintic.push_back(cell_weights<2>(u - cell));
+  const auto n = size_t(p1 - p0);
+  Phase phase{std::vector<int>(n), std::vector<double>(n), std::vector<CellWeights>(n),
+              std::vector<CellWeights>(n)};
+  const double cells = std::ldexp(1, -level);
+  for (size_t k = 0; k < n; ++k) {
+    const double u = positions.at(p0 + int(k)) * cells, cell = std::floor(u);
+    phase.cell[k] = int(cell), phase.t[k] = u - cell;
+    phase.cubic[k] = cell_weights<1>(u - cell), phase.quintic[k] = cell_weights<2>(u - cell);
   }
   return phase;
 }

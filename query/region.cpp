@@ -123,15 +123,23 @@ bool Region::meets(const Grid& grid, const GridShape::Block& b) const {
   const LatticeRect domain = grid.info.shape.domain(b.level, b.bx, b.by);
   const Extent around = grid.info.frame.bounds(domain);
   if (!around.meets(bounds_)) return false;
-  const bool rotated = grid.info.frame.numbers()[2] != 0 || grid.info.frame.numbers()[4] != 0;
-  if (!outline_ && (!rotated || bounds_.xmin < -1e299)) return true;
-  const Polygon patch = polygon_of(grid.info.frame, domain);
+  const Frame& f = grid.info.frame;
   // A polygon without a side in the patch holds all of it, or nothing.
   if (outline_)
-    return outline_->crosses(patch, around) ||
-           outline_->contains(grid.info.frame.to_domain(domain.i0, domain.j0));
-  return bg::intersects(patch,
-                        bg::model::box<Vertex>({bounds_.xmin, bounds_.ymin}, {bounds_.xmax, bounds_.ymax}));
+    return outline_->crosses(polygon_of(f, domain), around) ||
+           outline_->contains(f.to_domain(domain.i0, domain.j0));
+  const bool rotated = f.numbers()[2] != 0 || f.numbers()[4] != 0;
+  const Extent& e = bounds_;
+  if (!rotated || (e.contains({around.xmin, around.ymin}) && e.contains({around.xmax, around.ymax})))
+    return true;
+  // Two convex sets are apart if a side of one of them parts them: here a patch's.
+  LatticeRect seen{INFINITY, INFINITY, -INFINITY, -INFINITY};
+  for (const double x : {e.xmin, e.xmax})
+    for (const double y : {e.ymin, e.ymax}) {
+      const Point p = f.to_lattice(x, y);
+      seen = {std::min(seen.i0, p.x), std::min(seen.j0, p.y), std::max(seen.i1, p.x), std::max(seen.j1, p.y)};
+    }
+  return seen.i0 <= domain.i1 && domain.i0 <= seen.i1 && seen.j0 <= domain.j1 && domain.j0 <= seen.j1;
 }
 
 }  // namespace patchwork

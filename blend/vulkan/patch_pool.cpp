@@ -119,6 +119,7 @@ void PatchPool::hold(std::span<const PatchId> patches) {
     else
       at->second.held = holds_;
   }
+  std::sort(missing.begin(), missing.end());  // by place: neighbours are cut from the same chunks
   for (const PatchId id : missing) add(id);
   impl_->ring.flush();
 }

@@ -64,13 +64,10 @@ class PointRun : public Run {
   PointRun(const Run& run, std::span<const double> x, std::span<const double> y) : Run(run), x_(x), y_(y) {}
 
   void halve(std::span<std::uint32_t> points, const Candidates& from) {
-    Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
-    for (const std::uint32_t k : points)
-      e = {std::min(e.xmin, x_[k]), std::min(e.ymin, y_[k]), std::max(e.xmax, x_[k]),
-           std::max(e.ymax, y_[k])};
-    const Point corners[4] = {{e.xmin, e.ymin}, {e.xmax, e.ymin}, {e.xmax, e.ymax}, {e.xmin, e.ymax}};
+    Extent e = Extent::nothing();
+    for (const std::uint32_t k : points) e.add(Point{x_[k], y_[k]});
     bool inside = false;
-    const Candidates candidates = filter(placed, from, corners, priority(), inside);
+    const Candidates candidates = filter(placed, from, e.corners(), priority(), inside);
     // Few points under many patches are halved on: each batch asks all of its candidates about all of its
     // points.
     if (points.size() <= Batch::kPoints && (points.size() <= 32 || inside || candidates.size() <= 8)) {
@@ -106,7 +103,7 @@ class PixelRun : public Run {
       : Run(run), raster_(raster), width_(width), row_(row) {}
 
   void halve(int c0, int r0, int c1, int r1, const Candidates& from) {
-    const Point corners[4] = {at(c0, r0), at(c1 - 1, r0), at(c1 - 1, r1 - 1), at(c0, r1 - 1)};
+    const Corners corners{at(c0, r0), at(c1 - 1, r0), at(c1 - 1, r1 - 1), at(c0, r1 - 1)};
     bool inside = false;
     const Candidates candidates = filter(placed, from, corners, priority(), inside);
     if (c1 - c0 <= kSide && r1 - r0 <= kSide) {

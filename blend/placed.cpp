@@ -39,7 +39,7 @@ Blend::Placed place(const Database& db, PatchId id, int smoothness) {
   const LatticeRect domain = shape.domain(id.level(), id.bx(), id.by());
   p.kernel = to_window(shape.kernel(id.level(), id.bx(), id.by()), p, scale);
   p.domain = to_window(domain, p, scale);
-  p.samples = to_window({0, 0, shape.width() - 1.0, shape.height() - 1.0}, p, scale);
+  p.samples = to_window(shape.samples(), p, scale);
   p.ramp = ramp_of(p.kernel, p.domain, p.samples);
   p.has_rim = p.ramp.i0 > p.domain.i0 || p.ramp.j0 > p.domain.j0 || p.ramp.i1 < p.domain.i1 ||
               p.ramp.j1 < p.domain.j1;
@@ -47,29 +47,26 @@ Blend::Placed place(const Database& db, PatchId id, int smoothness) {
   p.ragged = record.ragged();
   p.rim = g.info.rim_error;
   p.error = record.error[size_t(smoothness)];
-  p.volume = 4 / ((domain.i1 - domain.i0) * (domain.j1 - domain.j0) * f.cell_area());
+  p.volume = 4 / (domain.area() * f.cell_area());
   p.quantum = g.info.quantum, p.base = g.info.base, p.origin = double(g.info.code_origin);
   p.source = std::int32_t(&g - db.grids().data()) + 1;
   p.bounds = f.bounds(domain);
   return p;
 }
 
-LatticeRect Blend::Placed::window_bounds(const Point corners[4]) const {
-  LatticeRect r{INFINITY, INFINITY, -INFINITY, -INFINITY};
-  for (int k = 0; k < 4; ++k) {
-    const double dx = corners[k].x - x0, dy = corners[k].y - y0;
-    const double u = (ua * dx + ub * dy) - first_i, v = (va * dx + vb * dy) - first_j;
-    r = {std::min(r.i0, u), std::min(r.j0, v), std::max(r.i1, u), std::max(r.j1, v)};
+LatticeRect Blend::Placed::window_bounds(const Corners& corners) const {
+  LatticeRect r = LatticeRect::nothing();
+  for (const Point& c : corners) {
+    const double dx = c.x - x0, dy = c.y - y0;
+    r.add({(ua * dx + ub * dy) - first_i, (va * dx + vb * dy) - first_j});
   }
   return r;
 }
 
-Candidates filter(const std::vector<Blend::Placed>& placed, const Candidates& from, const Point corners[4],
+Candidates filter(const std::vector<Blend::Placed>& placed, const Candidates& from, const Corners& corners,
                   bool priority, bool& inside) {
-  Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
-  for (int k = 0; k < 4; ++k)
-    e = {std::min(e.xmin, corners[k].x), std::min(e.ymin, corners[k].y), std::max(e.xmax, corners[k].x),
-         std::max(e.ymax, corners[k].y)};
+  Extent e = Extent::nothing();
+  for (const Point& corner : corners) e.add(corner);
   Candidates kept;
   inside = false;
   for (const std::uint32_t c : from) {

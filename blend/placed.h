@@ -24,7 +24,7 @@ struct Blend::Placed {
   bool has_rim;                  // the ramp is not the domain
   Extent bounds;
 
-  LatticeRect window_bounds(const Point corners[4]) const;
+  LatticeRect window_bounds(const Corners& corners) const;
   // No point of the kernel lies beyond the outer samples, whatever the rounding.
   bool kernel_is_sampled() const {
     return kernel.i0 > samples.i0 && kernel.j0 > samples.j0 && kernel.i1 < samples.i1 &&
@@ -40,7 +40,7 @@ using Candidates = std::vector<std::uint32_t>;
 
 /// The patches among `from` that may reach a quadrangle, in order. With priority none after one whose kernel
 /// holds it all; `inside` tells that this one is the first.
-Candidates filter(const std::vector<Blend::Placed>& placed, const Candidates& from, const Point corners[4],
+Candidates filter(const std::vector<Blend::Placed>& placed, const Candidates& from, const Corners& corners,
                   bool priority, bool& inside);
 
 }  // namespace patchwork

@@ -329,12 +329,8 @@ CoverageCounts Database::coverage_counts() const { return impl_->counts; }
 std::uint64_t Database::file_bytes() const { return impl_->store->file_bytes(); }
 
 Extent Database::extent() const {
-  Extent all{INFINITY, INFINITY, -INFINITY, -INFINITY};
-  for (const Grid& g : impl_->grids) {
-    const Extent e = g.info.frame.bounds(g.info.shape.footprint());
-    all = {std::min(all.xmin, e.xmin), std::min(all.ymin, e.ymin), std::max(all.xmax, e.xmax),
-           std::max(all.ymax, e.ymax)};
-  }
+  Extent all = Extent::nothing();
+  for (const Grid& g : impl_->grids) all.add(g.info.bounds());
   return all;
 }
 

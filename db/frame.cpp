@@ -34,16 +34,13 @@ Frame Frame::from_geotransform(const std::array<double, 6>& gt, const std::strin
 
 double Frame::step_i() const { return std::hypot(n_[1], n_[4]); }
 double Frame::step_j() const { return std::hypot(n_[2], n_[5]); }
+double Frame::finer_step() const { return std::min(step_i(), step_j()); }
 double Frame::cell_area() const { return std::abs(n_[1] * n_[5] - n_[2] * n_[4]); }
 double Frame::angle_degrees() const { return std::atan2(n_[4], n_[1]) * 180 / std::numbers::pi; }
 
 Extent Frame::bounds(const LatticeRect& r) const {
-  Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
-  for (const double i : {r.i0, r.i1})
-    for (const double j : {r.j0, r.j1}) {
-      const Point p = to_domain(i, j);
-      e = {std::min(e.xmin, p.x), std::min(e.ymin, p.y), std::max(e.xmax, p.x), std::max(e.ymax, p.y)};
-    }
+  Extent e = Extent::nothing();
+  for (const Point p : corners(r)) e.add(p);
   const double sx = 4e-16 * std::max(std::abs(e.xmin), std::abs(e.xmax));
   const double sy = 4e-16 * std::max(std::abs(e.ymin), std::abs(e.ymax));
   return {e.xmin - sx, e.ymin - sy, e.xmax + sx, e.ymax + sy};

@@ -36,6 +36,8 @@ class GridShape {
   int levels() const { return int(levels_.size()); }
 
   LatticeRect footprint() const { return {-pad_, -pad_, width_ - 1 + pad_, height_ - 1 + pad_}; }
+  /// Where the outer samples lie.
+  LatticeRect samples() const { return {0, 0, width_ - 1.0, height_ - 1.0}; }
   /// The footprint shrunk by one feather: what the kernels of every level cover together.
   LatticeRect core() const { return core_; }
 

@@ -99,7 +99,7 @@ class Importer {
     g.accuracy = source_.accuracy();
     g.quantum = source_.scale() * q.quantum, g.base = source_.offset(), g.code_origin = q.origin;
     g.quantisation = q.error * std::abs(source_.scale());
-    const Extent place = g.frame.bounds(g.shape.footprint());
+    const Extent place = g.bounds();
     if (!std::isfinite(place.xmax - place.xmin) || !std::isfinite(place.ymax - place.ymin))
       throw Error(source_.path(), "its geotransform puts it beyond all numbers",
                   "georeference the file again");
@@ -248,7 +248,7 @@ class Importer {
     for (const Grid& other : db_.grids)
       if (other.info.digest == g.digest) report_.duplicate_of = other.info.name;
     report_.name = g.name, report_.accuracy = g.accuracy, report_.quantisation = g.quantisation;
-    report_.extent = g.frame.bounds(g.shape.footprint());
+    report_.extent = g.bounds();
     if (!report_.duplicate_of.empty()) return;
     make_records();
     bool exists = false;
@@ -381,7 +381,7 @@ RemoveReport Database::remove(const std::string& name) {
   impl_->change([&] {
     const std::size_t place = impl_->place(name);
     const GridInfo& info = impl_->grids[place].info;
-    report.extent = info.frame.bounds(info.shape.footprint());
+    report.extent = info.bounds();
     Restate restate(*impl_);
     restate.remove(place);
     restate.store("remove " + name, report.extent);

@@ -50,7 +50,7 @@ class Search {
                           block,
                           grid.patches[place_.index],
                           kernel,
-                          area(kernel) * grid.info.frame.cell_area(),
+                          kernel.area() * grid.info.frame.cell_area(),
                           grid.info.frame.bounds(kernel)};
     const CoverageCounts before = counts_;
     const Standing s{top(subject), best(subject)};
@@ -80,7 +80,7 @@ class Search {
     }
     for (int l = s.block.level - 1, bx = s.block.bx, by = s.block.by; l >= 0; --l) {
       bx *= 2, by *= 2;
-      if (area(shape.kernel(l, bx, by)) != area(s.kernel)) break;
+      if (shape.kernel(l, bx, by).area() != s.kernel.area()) break;
       note(shape.index(l, bx, by));
     }
     return top;
@@ -152,7 +152,7 @@ class Search {
       offer(g, k, level, bx, by);
       if (!g.patches[k].ragged()) return;
     }
-    if (level == 0 || area(kernel) * g.info.frame.cell_area() < s.area * kFinestShare) return;
+    if (level == 0 || kernel.area() * g.info.frame.cell_area() < s.area * kFinestShare) return;
     for (int y = 2 * by; y < std::min(2 * by + 2, shape.blocks_j(level - 1)); ++y)
       for (int x = 2 * bx; x < std::min(2 * bx + 2, shape.blocks_i(level - 1)); ++x)
         descend(g, level - 1, x, y, s);
@@ -161,7 +161,7 @@ class Search {
   template <class Visit>
   void each_overlapping(const Subject& s, Visit visit) const {
     for (const Grid& g : grids_)
-      if (&g != &s.grid && g.info.frame.bounds(g.info.shape.footprint()).meets(s.bounds)) visit(g);
+      if (&g != &s.grid && g.info.bounds().meets(s.bounds)) visit(g);
   }
 
   // Towards other grids a patch offers its kernel; a ragged one only the rectangles where it speaks with full
@@ -217,9 +217,10 @@ bool less(const Grid& a, std::size_t ia, const Grid& b, std::size_t ib, Coverage
   const LatticeRect ka = a.info.shape.kernel(p.level, p.bx, p.by),
                     kb = b.info.shape.kernel(q.level, q.bx, q.by);
   if (&a == &b) {
-    if (area(ka) != area(kb)) return area(ka) < area(kb);  // exact: products of dyadic numbers of a few bits
+    if (ka.area() != kb.area())
+      return ka.area() < kb.area();  // exact: products of dyadic numbers of a few bits
   } else {
-    const double x = area(ka) * a.info.frame.cell_area(), y = area(kb) * b.info.frame.cell_area();
+    const double x = ka.area() * a.info.frame.cell_area(), y = kb.area() * b.info.frame.cell_area();
     if (std::abs(x - y) > kAreaDoubt * std::max(x, y)) return x < y;
     if (const int sign = compare_areas({&a.info.frame, ka}, {&b.info.frame, kb}, counts)) return sign < 0;
   }

@@ -16,9 +16,6 @@ struct PatchPlace {
   std::size_t grid = 0, index = 0;
 };
 
-/// In level-0 cells; exact for kernels: a product of dyadic numbers of a few bits.
-inline double area(const LatticeRect& r) { return (r.i1 - r.i0) * (r.j1 - r.j0); }
-
 /// The strict total order on patches (design: model, section 3): kernel area, then bottom (the larger is
 /// less), then the content key: digest, level, block.
 bool less(const Grid& a, std::size_t ia, const Grid& b, std::size_t ib, CoverageCounts& counts);

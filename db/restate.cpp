@@ -51,7 +51,7 @@ std::vector<PatchPlace> Restate::places_near(const Extent& extent, std::size_t a
       });
       continue;
     }
-    if (!grid.info.frame.bounds(grid.info.shape.footprint()).meets(extent)) continue;
+    if (!grid.info.bounds().meets(extent)) continue;
     for (int l = 0; l < grid.info.shape.levels(); ++l) {
       const BlockRange r = blocks_near(grid.info, l, extent);
       for (int by = r.j0; by <= r.j1; ++by)
@@ -67,7 +67,7 @@ std::vector<PatchPlace> Restate::places_near(const Extent& extent, std::size_t a
 }
 
 void Restate::add(Grid grid) {
-  const Extent extent = grid.info.frame.bounds(grid.info.shape.footprint());
+  const Extent extent = grid.info.bounds();
   const double least = smallest_bottom(grid);
   const auto place = std::lower_bound(db_.grids.begin(), db_.grids.end(), grid.info.id,
                                       [](const Grid& g, GridId id) { return g.info.id < id; });
@@ -84,7 +84,7 @@ void Restate::add(Grid grid) {
 
 void Restate::remove(std::size_t place) {
   const Grid gone = std::move(db_.grids[place]);
-  const Extent extent = gone.info.frame.bounds(gone.info.shape.footprint());
+  const Extent extent = gone.info.bounds();
   double least = -std::numeric_limits<double>::infinity();
   try {
     gone.patches.each([&](std::size_t k, const PatchRecord& p) {

@@ -38,10 +38,6 @@ Vector cross(const Vector& a, const Vector& b) {
 }
 Vector normalised(const Vector& a) { return (1 / std::hypot(a[0], a[1], a[2])) * a; }
 
-double turn(const Point& a, const Point& b, const Point& c) {
-  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-}
-
 // Andrew's monotone chain (1979).
 std::vector<Point> convex_hull(std::vector<Point> points) {
   std::sort(points.begin(), points.end(),
@@ -147,8 +143,7 @@ class ViewSurface : public CutSurface {
       const double nx = b.y - a.y, ny = a.x - b.x;  // outward of a counterclockwise polygon
       if (k % EightSides::kSides == 0) sides_.emplace_back();
       sides_.back().set(k % EightSides::kSides, nx, ny, std::max(nx * a.x + ny * a.y, nx * b.x + ny * b.y));
-      bounds_ = {std::min(bounds_.xmin, a.x), std::min(bounds_.ymin, a.y), std::max(bounds_.xmax, a.x),
-                 std::max(bounds_.ymax, a.y)};
+      bounds_.add(a);
     }
   }
 
@@ -169,19 +164,14 @@ class ViewSurface : public CutSurface {
     if (sides_.empty()) return false;
     const LatticeRect d = grid.info.shape.domain(b.level, b.bx, b.by);
     const Frame& f = grid.info.frame;
-    const Point rect[] = {f.to_domain(d.i0, d.j0), f.to_domain(d.i1, d.j0), f.to_domain(d.i1, d.j1),
-                          f.to_domain(d.i0, d.j1)};
+    const Corners rect = f.corners(d);
     for (std::size_t k = 0; k < corners_.size(); ++k) {
       const auto beyond = [&](const Point& p) {
         return sides_[k / EightSides::kSides].beyond(k % EightSides::kSides, p);
       };
-      if (std::all_of(std::begin(rect), std::end(rect), beyond)) return false;
+      if (std::all_of(rect.begin(), rect.end(), beyond)) return false;
     }
-    LatticeRect seen{INFINITY, INFINITY, -INFINITY, -INFINITY};
-    for (const Point& c : corners_) {
-      const Point p = f.to_lattice(c.x, c.y);
-      seen = {std::min(seen.i0, p.x), std::min(seen.j0, p.y), std::max(seen.i1, p.x), std::max(seen.j1, p.y)};
-    }
+    const LatticeRect seen = f.lattice_bounds(corners_);
     return seen.i0 <= d.i1 && d.i0 <= seen.i1 && seen.j0 <= d.j1 && d.j0 <= seen.j1;
   }
 
@@ -201,7 +191,7 @@ class ViewSurface : public CutSurface {
   double above_;  // metres that the eye is above or below all terrain, where the cut is in space
   double slope_;  // metres of tolerance a metre of distance
   std::vector<Point> corners_;
-  Extent bounds_{INFINITY, INFINITY, -INFINITY, -INFINITY};  // of the corners
+  Extent bounds_ = Extent::nothing();  // of the corners
   std::vector<EightSides> sides_;
 };
 

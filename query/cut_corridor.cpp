@@ -1,6 +1,5 @@
 // The corridor: a polyline that needs more accuracy than its surroundings.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -16,15 +15,9 @@ double distance(const Point& p, const Point& a, const Point& b) {
   return std::hypot(p.x - (a.x + t * dx), p.y - (a.y + t * dy));
 }
 
-double turn(const Point& a, const Point& b, const Point& p) {
-  return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
-}
-
 bool cross(const Point& a, const Point& b, const Point& p, const Point& q) {
   return (turn(a, b, p) > 0) != (turn(a, b, q) > 0) && (turn(p, q, a) > 0) != (turn(p, q, b) > 0);
 }
-
-using Corners = std::array<Point, 4>;  // of a rectangle, in turn
 
 bool holds(const Corners& r, const Point& p) {
   int left = 0;
@@ -62,15 +55,11 @@ class CorridorSurface : public RangedSurface {
     return tolerance(nearest);
   }
   ToleranceRange over(const Frame& f, const LatticeRect& r) const override {
-    return over(
-        {f.to_domain(r.i0, r.j0), f.to_domain(r.i1, r.j0), f.to_domain(r.i1, r.j1), f.to_domain(r.i0, r.j1)},
-        kHair);
+    return over(f.corners(r), kHair);
   }
 
  protected:
-  ToleranceRange within(const Extent& e) const override {
-    return over({Point{e.xmin, e.ymin}, {e.xmax, e.ymin}, {e.xmax, e.ymax}, {e.xmin, e.ymax}}, 2 * kHair);
-  }
+  ToleranceRange within(const Extent& e) const override { return over(e.corners(), 2 * kHair); }
 
  private:
   static constexpr double kHair = 1e-9;  // of the distances, for their rounding

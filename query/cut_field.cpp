@@ -50,27 +50,18 @@ class FieldSurface : public RangedSurface {
     return double(f.low[std::size_t(j) * std::size_t(f.width) + std::size_t(i)]);
   }
   ToleranceRange over(const Frame& frame, const LatticeRect& r) const override {
-    const Point corners[] = {frame.to_domain(r.i0, r.j0), frame.to_domain(r.i1, r.j0),
-                             frame.to_domain(r.i1, r.j1), frame.to_domain(r.i0, r.j1)};
-    return around(corners);
+    return around(frame.corners(r));
   }
 
  protected:
-  ToleranceRange within(const Extent& e) const override {
-    const Point corners[] = {{e.xmin, e.ymin}, {e.xmax, e.ymin}, {e.xmax, e.ymax}, {e.xmin, e.ymax}};
-    return around(corners);
-  }
+  ToleranceRange within(const Extent& e) const override { return around(e.corners()); }
 
  private:
   static constexpr double kMostPixels = 8;  // along each side, that a range is taken over
   static constexpr double kHair = 1e-6;     // of a pixel: what rounding may move a corner
 
-  ToleranceRange around(const Point (&corners)[4]) const {
-    double i0 = INFINITY, j0 = INFINITY, i1 = -INFINITY, j1 = -INFINITY;
-    for (const Point& c : corners) {
-      const Point l = frame_.to_lattice(c.x, c.y);
-      i0 = std::min(i0, l.x), j0 = std::min(j0, l.y), i1 = std::max(i1, l.x), j1 = std::max(j1, l.y);
-    }
+  ToleranceRange around(const Corners& corners) const {
+    auto [i0, j0, i1, j1] = frame_.lattice_bounds(corners);
     i0 = std::floor(i0 + 0.5 - kHair), j0 = std::floor(j0 + 0.5 - kHair);
     i1 = std::floor(i1 + 0.5 + kHair), j1 = std::floor(j1 + 0.5 + kHair);
     const FieldLevel& whole = levels_.front();

@@ -6,7 +6,6 @@
 #include <iterator>
 
 #include "db/error.h"
-#include "db/invariant.h"
 #include "query/found.h"
 
 namespace patchwork {
@@ -40,7 +39,7 @@ Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
     if (asked.low >= p.top || (p.bottom > asked.high && (strict || !p.best()))) return;
     if (!cut.meets(grid, block)) return;
     const LatticeRect kernel = grid.info.shape.kernel(block.level, block.bx, block.by);
-    found.push_back({p.bottom, area(kernel), &grid, index, e.id});
+    found.push_back({p.bottom, kernel.area(), &grid, index, e.id});
     largest_asked = std::max(largest_asked, asked.high);
   };
   const VisitCost visited =

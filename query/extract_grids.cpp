@@ -1,6 +1,5 @@
 #include <chrono>
 
-#include "db/invariant.h"
 #include "query/found.h"
 
 namespace patchwork {
@@ -18,7 +17,7 @@ Extraction extract_grids(const Database& db, std::span<const GridId> grids, cons
       const PatchRecord& p = grid.patches[k];
       if (p.exists())
         found.push_back(
-            {p.bottom, area(shape.kernel(0, b.bx, b.by)), &grid, k, PatchId::make(id, 0, b.bx, b.by)});
+            {p.bottom, shape.kernel(0, b.bx, b.by).area(), &grid, k, PatchId::make(id, 0, b.bx, b.by)});
     }
   }
   Extraction result = in_order(found);

@@ -19,9 +19,7 @@ using Polygon = bg::model::polygon<Vertex>;
 
 Polygon polygon_of(const Frame& frame, const LatticeRect& r) {
   Polygon p;
-  for (const Point c : {frame.to_domain(r.i0, r.j0), frame.to_domain(r.i1, r.j0), frame.to_domain(r.i1, r.j1),
-                        frame.to_domain(r.i0, r.j1)})
-    bg::append(p.outer(), Vertex(c.x, c.y));
+  for (const Point c : frame.corners(r)) bg::append(p.outer(), Vertex(c.x, c.y));
   bg::correct(p);
   return p;
 }
@@ -84,11 +82,10 @@ Region Region::inside(const Extent& e) {
 Region Region::inside(const std::vector<Point>& corners) {
   if (corners.size() < 3) throw Error("polygon", "it needs at least three corners");
   Region r;
-  r.bounds_ = {INFINITY, INFINITY, -INFINITY, -INFINITY};
+  r.bounds_ = Extent::nothing();
   for (const Point& p : corners) {
     if (!std::isfinite(p.x) || !std::isfinite(p.y)) throw Error("polygon", "a corner is not finite");
-    r.bounds_ = {std::min(r.bounds_.xmin, p.x), std::min(r.bounds_.ymin, p.y), std::max(r.bounds_.xmax, p.x),
-                 std::max(r.bounds_.ymax, p.y)};
+    r.bounds_.add(p);
   }
   r.outline_ = std::make_shared<const Outline>(corners, r.bounds_);
   return r;

@@ -9,10 +9,8 @@ namespace patchwork {
 namespace {
 
 Extent united_of(const std::vector<Extent>& all) {
-  Extent u = all.front();
-  for (const Extent& e : all)
-    u = {std::min(u.xmin, e.xmin), std::min(u.ymin, e.ymin), std::max(u.xmax, e.xmax),
-         std::max(u.ymax, e.ymax)};
+  Extent u = Extent::nothing();
+  for (const Extent& e : all) u.add(e);
   return u;
 }
 

@@ -12,8 +12,6 @@ namespace {
 constexpr int kFiner = 5, kLarger = 1;
 constexpr std::size_t kRuns = 6, kRun = 64;  // records of a level that are looked at: runs of neighbours
 
-double step_of(const GridInfo& g) { return std::min(g.frame.step_i(), g.frame.step_j()); }
-
 // Bottoms of some patches of a level, but for those of flat ground, which say nothing of what the level
 // misses.
 void sample_bottoms(const Grid& grid, int level, std::vector<double>& bottoms) {
@@ -58,7 +56,7 @@ Extent TileLattice::bounds(const TileKey& k) const {
 bool TileLattice::fits(const Database& db) const {
   const Extent root = bounds(this->root()), data = db.extent();
   for (const Grid& g : db.grids())
-    if (step_of(g.info) < step(0) * 0.99 && levels() < kMaxLevels) return false;
+    if (g.info.frame.finer_step() < step(0) * 0.99 && levels() < kMaxLevels) return false;
   return root.contains({data.xmin, data.ymin}) && root.contains({data.xmax, data.ymax});
 }
 
@@ -69,9 +67,9 @@ TileLattice TileLattice::over(const Database& db) {
   const Extent e = db.extent();
   const Grid* finest = &db.grids().front();
   for (const Grid& g : db.grids())
-    if (step_of(g.info) < step_of(finest->info)) finest = &g;
+    if (g.info.frame.finer_step() < finest->info.frame.finer_step()) finest = &g;
   const double side = std::max(e.xmax - e.xmin, e.ymax - e.ymin);
-  double step = std::ldexp(step_of(finest->info), -kFiner);
+  double step = std::ldexp(finest->info.frame.finer_step(), -kFiner);
   while (std::ldexp(kCells * step, kMaxLevels - 1 - kLarger) < side + step) step *= 2;
   int levels = 1;
   while (std::ldexp(kCells * step, levels - 1 - kLarger) < side + step) ++levels;
@@ -85,7 +83,7 @@ TileLattice TileLattice::over(const Database& db) {
   std::vector<std::vector<double>> bottoms(static_cast<std::size_t>(levels));
   for (const Grid& g : db.grids())
     for (int l = 0; l < g.info.shape.levels(); ++l) {
-      const double octave = std::log2(step_of(g.info) / step) + l;
+      const double octave = std::log2(g.info.frame.finer_step() / step) + l;
       const int level = std::clamp(int(std::ceil(octave - 0.01)), 0, levels - 1);
       sample_bottoms(g, l, bottoms[std::size_t(level)]);
     }

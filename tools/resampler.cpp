@@ -37,8 +37,8 @@ double finest_step(const Database& db, const Extent& extent, std::span<const Gri
     return among.empty() || std::find(among.begin(), among.end(), id) != among.end();
   };
   for (const Grid& g : db.grids())
-    if (counts(g.info.id) && g.info.frame.bounds(g.info.shape.footprint()).meets(extent))
-      finest = std::min({finest, g.info.frame.step_i(), g.info.frame.step_j()});
+    if (counts(g.info.id) && g.info.bounds().meets(extent))
+      finest = std::min(finest, g.info.frame.finer_step());
   if (!std::isfinite(finest))
     throw Error(db.path(), "no grid meets the extent", "see its extent with: patchwork info");
   return finest;

@@ -31,7 +31,7 @@ class Binner {
       : placed_(placed), lattice_(lattice), tiles_(tiles), priority_(priority), found(tiles.size()) {}
 
   void halve(std::span<std::uint32_t> some, const Candidates& from) {
-    Point corners[4];
+    Corners corners;
     const bool wide = corners_of(some, corners);
     bool inside = false;
     Candidates candidates = filter(placed_, from, corners, priority_, inside);
@@ -49,7 +49,7 @@ class Binner {
 
  private:
   // True if the quadrangle's longer side lies along the lattice's columns.
-  bool corners_of(std::span<const std::uint32_t> some, Point (&corners)[4]) const {
+  bool corners_of(std::span<const std::uint32_t> some, Corners& corners) const {
     double c0 = INFINITY, r0 = INFINITY, c1 = -INFINITY, r1 = -INFINITY;
     for (const std::uint32_t k : some) {
       const Tile& t = tiles_[k];

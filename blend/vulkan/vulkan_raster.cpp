@@ -64,13 +64,10 @@ class PointGroups {
   std::vector<Group> groups;
 
   void halve(std::span<std::uint32_t> points, const Candidates& from) {
-    Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
-    for (const std::uint32_t k : points)
-      e = {std::min(e.xmin, x_[k]), std::min(e.ymin, y_[k]), std::max(e.xmax, x_[k]),
-           std::max(e.ymax, y_[k])};
-    const Point corners[4] = {{e.xmin, e.ymin}, {e.xmax, e.ymin}, {e.xmax, e.ymax}, {e.xmin, e.ymax}};
+    Extent e = Extent::nothing();
+    for (const std::uint32_t k : points) e.add(Point{x_[k], y_[k]});
     bool inside = false;
-    Candidates patches = filter(placed_, from, corners, priority_, inside);
+    Candidates patches = filter(placed_, from, e.corners(), priority_, inside);
     if (points.size() <= kGroup) {
       groups.push_back({points, std::move(patches)});
       return;

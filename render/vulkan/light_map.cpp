@@ -41,7 +41,7 @@ Buffer buffer_of(const Device::Impl& device, std::span<const float> values) {
 
 double finest_step(const Database& db) {
   double finest = INFINITY;
-  for (const Grid& g : db.grids()) finest = std::min({finest, g.info.frame.step_i(), g.info.frame.step_j()});
+  for (const Grid& g : db.grids()) finest = std::min(finest, g.info.frame.finer_step());
   return finest;
 }
 

@@ -56,7 +56,7 @@ struct PatchFacts {
 // A patch with cells smaller than the distance of samples may stick out between these by as much as it
 // departs from the patch of its own grid that they do resolve, twice: up here, down there.
 double missed(const Grid& grid, const PatchId& id, double spacing) {
-  const double step = std::min(grid.info.frame.step_i(), grid.info.frame.step_j());
+  const double step = grid.info.frame.finer_step();
   int level = id.level(), bx = id.bx(), by = id.by();
   if (std::ldexp(step, level) >= spacing * 0.99) return 0;
   double bottom = grid.at(level, bx, by).bottom;

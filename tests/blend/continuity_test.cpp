@@ -76,7 +76,7 @@ bool only_rims_meet(const Database& db, Point p) {
   int reached = 0;
   for (const Grid& g : db.grids()) {
     const GridShape& shape = g.info.shape;
-    if (holds(g, {0, 0, shape.width() - 1.0, shape.height() - 1.0}, p)) return false;
+    if (holds(g, shape.samples(), p)) return false;
     reached += holds(g, shape.footprint(), p);
   }
   return reached > 1;

@@ -11,7 +11,6 @@
 namespace patchwork {
 namespace {
 
-double area(const LatticeRect& r) { return (r.i1 - r.i0) * (r.j1 - r.j0); }
 bool inside(const LatticeRect& a, const LatticeRect& b) {
   return a.i0 >= b.i0 && a.j0 >= b.j0 && a.i1 <= b.i1 && a.j1 <= b.j1;
 }
@@ -65,9 +64,9 @@ TEST(GridShape, TheKernelsOfEveryLevelTileTheSameCore) {
         if (by > 0) {
           EXPECT_EQ(k.j0, s.kernel(l, bx, by - 1).j1);
         }
-        sum += area(k);
+        sum += k.area();
       });
-      EXPECT_EQ(sum, area(s.core())) << s.width() << " x " << s.height() << " level " << l;
+      EXPECT_EQ(sum, s.core().area()) << s.width() << " x " << s.height() << " level " << l;
       // Negative control: a feather of so many cells of each level leaves parents too small.
       const double rim = std::ldexp(kFeatherCells, l);
       const LatticeRect f = s.footprint(), naive{f.i0 + rim, f.j0 + rim, f.i1 - rim, f.j1 - rim};
@@ -85,9 +84,9 @@ TEST(GridShape, AKernelIsTheUnionOfItsFourChildren) {
         for (int y = 2 * by; y < std::min(2 * by + 2, s.blocks_j(l - 1)); ++y)
           for (int x = 2 * bx; x < std::min(2 * bx + 2, s.blocks_i(l - 1)); ++x) {
             EXPECT_TRUE(inside(s.kernel(l - 1, x, y), s.kernel(l, bx, by)));
-            sum += area(s.kernel(l - 1, x, y));
+            sum += s.kernel(l - 1, x, y).area();
           }
-        EXPECT_EQ(sum, area(s.kernel(l, bx, by)));
+        EXPECT_EQ(sum, s.kernel(l, bx, by).area());
       });
 }
 

@@ -205,7 +205,7 @@ CastSurface surface_of(const Database& db, std::span<const PatchId> patches, con
   s.lowest -= beyond + 1, s.highest += beyond + 1;
   for (const PatchId id : patches) {
     const Frame& f = db.grid(id.grid()).info.frame;
-    s.step = std::min(s.step, std::ldexp(std::min(f.step_i(), f.step_j()), id.level()) / 4);
+    s.step = std::min(s.step, std::ldexp(f.finer_step(), id.level()) / 4);
   }
   return s;
 }

@@ -81,11 +81,9 @@ bool inside(const std::vector<Point>& corners, const Point& at) {
 
 // Points of the extent that the footprint holds; fewer where it holds next to none.
 std::vector<Point> seen_points(const Extent& e, const std::vector<Point>& corners, std::mt19937_64& random) {
-  Extent b{INFINITY, INFINITY, -INFINITY, -INFINITY};
-  for (const Point& c : corners)
-    b = {std::min(b.xmin, c.x), std::min(b.ymin, c.y), std::max(b.xmax, c.x), std::max(b.ymax, c.y)};
-  b = {std::max(b.xmin, e.xmin), std::max(b.ymin, e.ymin), std::min(b.xmax, e.xmax),
-       std::min(b.ymax, e.ymax)};
+  Extent b = Extent::nothing();
+  for (const Point& c : corners) b.add(c);
+  b = b.common(e);
   std::vector<Point> points;
   if (!(b.xmin < b.xmax && b.ymin < b.ymax)) return points;
   std::uniform_real_distribution<double> x(b.xmin, b.xmax), y(b.ymin, b.ymax);

@@ -138,10 +138,9 @@ class QueryBench {
               .highest = heights_.second};
     const double a = between(0, 2 * M_PI);
     v.look = {v.eye.x + 5000 * std::cos(a), v.eye.y + 5000 * std::sin(a), v.eye.z - 1000};
-    Question q{make_surface(v), {INFINITY, INFINITY, -INFINITY, -INFINITY}, INFINITY, 0, {}};
+    Question q{make_surface(v), Extent::nothing(), INFINITY, 0, {}};
     for (const Point& p : footprint(v)) {
-      Extent& b = q.bounds;
-      b = {std::min(b.xmin, p.x), std::min(b.ymin, p.y), std::max(b.xmax, p.x), std::max(b.ymax, p.y)};
+      q.bounds.add(p);
       q.high = std::max(q.high, q.cut->at(p));
     }
     // The eye lies over the region, or near it; and a patch is asked for over its whole domain, which reaches

@@ -119,12 +119,8 @@ class Bench {
 
   // Beyond its outer samples a grid is continued, and its bounds tell of little else.
   Extent within_samples() const {
-    Extent all{INFINITY, INFINITY, -INFINITY, -INFINITY};
-    for (const Grid& g : db_.grids()) {
-      const Extent e = g.info.frame.bounds({0, 0, g.info.shape.width() - 1., g.info.shape.height() - 1.});
-      all = {std::min(all.xmin, e.xmin), std::min(all.ymin, e.ymin), std::max(all.xmax, e.xmax),
-             std::max(all.ymax, e.ymax)};
-    }
+    Extent all = Extent::nothing();
+    for (const Grid& g : db_.grids()) all.add(g.info.frame.bounds(g.info.shape.samples()));
     return all;
   }
 
@@ -270,7 +266,7 @@ class Bench {
     const auto sees = [&](Point at) {
       for (std::size_t c = 0; c < corners.size(); ++c) {
         const Point &p = corners[c], &q = corners[(c + 1) % corners.size()];
-        if ((q.x - p.x) * (at.y - p.y) - (q.y - p.y) * (at.x - p.x) < 0) return false;
+        if (turn(p, q, at) < 0) return false;
       }
       return corners.size() >= 3;
     };
@@ -291,12 +287,9 @@ class Bench {
       report_.notes.push_back("the view sees nothing of the extent: no pixel errors");
       return;
     }
-    window_ = {INFINITY, INFINITY, -INFINITY, -INFINITY};
-    for (const Point p : footprint(v))
-      window_ = {std::min(window_.xmin, p.x), std::min(window_.ymin, p.y), std::max(window_.xmax, p.x),
-                 std::max(window_.ymax, p.y)};
-    window_ = {std::max(window_.xmin, extent_.xmin), std::max(window_.ymin, extent_.ymin),
-               std::min(window_.xmax, extent_.xmax), std::min(window_.ymax, extent_.ymax)};
+    window_ = Extent::nothing();
+    for (const Point p : footprint(v)) window_.add(p);
+    window_ = window_.common(extent_);
     std::vector<Setting> all;
     for (const double pixels : kPixelErrors) {
       v.pixel_error = pixels;

@@ -75,7 +75,7 @@ bool only_rims_meet(const Database& db, Point p) {
   for (const Grid& g : db.grids()) {
     const GridShape& s = g.info.shape;
     const Point q = g.info.frame.to_lattice(p.x, p.y);
-    if (inside({0, 0, s.width() - 1., s.height() - 1.}, q.x, q.y, 0)) return false;
+    if (inside(s.samples(), q.x, q.y, 0)) return false;
     reached += inside(s.footprint(), q.x, q.y, -1e-6);
   }
   return reached > 1;

@@ -134,7 +134,7 @@ Verdict bound_is_what_was_asked(Trial& t) {
       bool inside = true;
       for (std::size_t c = 0; c < seen.size(); ++c) {
         const Point &a = seen[c], &b = seen[(c + 1) % seen.size()];
-        inside &= (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) > 0;
+        inside &= turn(a, b, p) > 0;
       }
       const double asked = cut->at(p);
       if (!inside || (!uniform && seen.size() < 3) || !(asked > 0) || !offers(t.db, p, asked)) continue;

@@ -19,9 +19,8 @@ struct Options {
 };
 
 Extent bounds_of(const std::vector<Point>& points) {
-  Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
-  for (const Point& p : points)
-    e = {std::min(e.xmin, p.x), std::min(e.ymin, p.y), std::max(e.xmax, p.x), std::max(e.ymax, p.y)};
+  Extent e = Extent::nothing();
+  for (const Point& p : points) e.add(p);
   return e;
 }
 

@@ -73,15 +73,10 @@ double kernel_size(const Grid& g, PatchId id) {
   return std::ldexp(kKernelCells * std::sqrt(g.info.frame.cell_area()), id.level());
 }
 
-std::array<Point, 4> outline(const Database& db, PatchId id, const Raster& r) {
-  const Grid& g = db.grid(id.grid());
-  const LatticeRect k = g.info.shape.kernel(id.level(), id.bx(), id.by());
-  std::array<Point, 4> corners;
-  const Point lattice[4] = {{k.i0, k.j0}, {k.i1, k.j0}, {k.i1, k.j1}, {k.i0, k.j1}};
-  for (std::size_t c = 0; c < 4; ++c) {
-    const Point p = g.info.frame.to_domain(lattice[c].x, lattice[c].y);
-    corners[c] = {(p.x - r.xmin) / r.step, (r.ymax - p.y) / r.step};
-  }
+Corners outline(const Database& db, PatchId id, const Raster& r) {
+  const GridInfo& g = db.grid(id.grid()).info;
+  Corners corners = g.frame.corners(g.shape.kernel(id.level(), id.bx(), id.by()));
+  for (Point& p : corners) p = {(p.x - r.xmin) / r.step, (r.ymax - p.y) / r.step};
   return corners;
 }
 

@@ -61,11 +61,11 @@ std::vector<Asked> asked(const Options& o) {
 }
 
 Extent bounds_of(const std::vector<Asked>& all) {
-  Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
+  Extent e = Extent::nothing();
   for (const Asked& a : all)
     for (const Point3& p : {a.from, a.to}) {
       if (!std::isfinite(p.x + p.y + p.z)) throw Error("sight", "an end is not finite");
-      e = {std::min(e.xmin, p.x), std::min(e.ymin, p.y), std::max(e.xmax, p.x), std::max(e.ymax, p.y)};
+      e.add(Point{p.x, p.y});
     }
   return e;
 }

@@ -35,12 +35,10 @@ std::vector<GridId> ids_of(const Database& db, const std::vector<std::string>& n
 }
 
 Extent bounds_of(const Database& db, const std::vector<GridId>& ids) {
-  Extent e{INFINITY, INFINITY, -INFINITY, -INFINITY};
+  Extent e = Extent::nothing();
   for (const GridId id : ids) {
     const GridInfo& g = db.grid(id).info;
-    const Extent f = g.frame.bounds({0, 0, g.shape.width() - 1.0, g.shape.height() - 1.0});
-    e = {std::min(e.xmin, f.xmin), std::min(e.ymin, f.ymin), std::max(e.xmax, f.xmax),
-         std::max(e.ymax, f.ymax)};
+    e.add(g.frame.bounds(g.shape.samples()));
   }
   return e;
 }
@@ -65,12 +63,8 @@ class Surface {
 Extent extent_of(const Database& db, const Options& o) {
   if (!o.region.extent.empty() || !o.region.polygon.empty()) return o.region.region().bounds();
   Extent e = db.extent();
-  for (const auto* names : {&o.before, &o.after}) {
-    if (names->empty()) continue;
-    const Extent f = bounds_of(db, ids_of(db, *names));
-    e = {std::max(e.xmin, f.xmin), std::max(e.ymin, f.ymin), std::min(e.xmax, f.xmax),
-         std::min(e.ymax, f.ymax)};
-  }
+  for (const auto* names : {&o.before, &o.after})
+    if (!names->empty()) e = e.common(bounds_of(db, ids_of(db, *names)));
   if (!(e.xmin < e.xmax && e.ymin < e.ymax)) throw Error("surveys", "they have no area in common");
   return e;
 }

@@ -36,9 +36,8 @@ Color level_color(int level, int levels) {
 
 // The part of a tile that lies on the map.
 void fill_tile(Canvas& canvas, const Plan& plan, const Extent& tile, Color color) {
-  const Extent& p = plan.place;
-  const Point a = plan({std::max(tile.xmin, p.xmin), std::min(tile.ymax, p.ymax)});
-  const Point b = plan({std::min(tile.xmax, p.xmax), std::max(tile.ymin, p.ymin)});
+  const Extent shown = tile.common(plan.place);
+  const Point a = plan({shown.xmin, shown.ymax}), b = plan({shown.xmax, shown.ymin});
   if (a.x >= b.x || a.y >= b.y) return;
   canvas.fill_rect(a.x, a.y, b.x - a.x, b.y - a.y, color);
   const Point corners[] = {a, {b.x, a.y}, b, {a.x, b.y}};
@@ -106,7 +105,7 @@ Image map_panel(const TileLattice& lattice, const TileMap& map) {
     fill_tile(canvas, plan, lattice.bounds(tile), level_color(tile.level, lattice.levels()));
     levels.insert(tile.level);
   }
-  for (std::array<Point, 4> corners : map.outlines) {
+  for (Corners corners : map.outlines) {
     for (Point& p : corners) p = plan(p);
     canvas.outline(corners, 1.5, kWhite, 0.9, plan.area());
   }

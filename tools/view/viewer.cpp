@@ -58,13 +58,9 @@ FlyCamera first(const Database& db, const Scene& scene) {
   return {c, 0.2 * glm::distance(vec(c.eye), vec(c.look))};
 }
 
-std::vector<std::array<Point, 4>> outlines(const Database& db) {
-  std::vector<std::array<Point, 4>> all;
-  for (const Grid& g : db.grids()) {
-    const LatticeRect r = g.info.shape.footprint();
-    const auto at = [&](double i, double j) { return g.info.frame.to_domain(i, j); };
-    all.push_back({at(r.i0, r.j0), at(r.i1, r.j0), at(r.i1, r.j1), at(r.i0, r.j1)});
-  }
+std::vector<Corners> outlines(const Database& db) {
+  std::vector<Corners> all;
+  for (const Grid& g : db.grids()) all.push_back(g.info.frame.corners(g.info.shape.footprint()));
   return all;
 }
 

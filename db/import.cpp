@@ -4,7 +4,6 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "db/database_impl.h"
@@ -12,6 +11,7 @@
 #include "db/error.h"
 #include "db/patch_errors.h"
 #include "db/restate.h"
+#include "db/stopwatch.h"
 
 namespace patchwork {
 
@@ -20,18 +20,6 @@ namespace {
 constexpr double kRimFactor =
     0.375;  // (t^2 + t) / 2 at half a cell: what a second difference makes of extrapolation
 constexpr int kTaskRows = kChunkVertices;
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-class Stopwatch {
- public:
-  void add_to(double& sum) { sum += now() - start_, start_ = now(); }
-
- private:
-  double start_ = now();
-};
 
 class MaskCells : public CellSource {
  public:
@@ -63,23 +51,23 @@ class Importer {
         ingest_(std::in_place, source, options.memory, options.tolerance,
                 [&](double share) { say(0.2 * share); }),
         errors_(std::in_place, ingest_->shape(), ingest_->masks()) {
-    watch_.add_to(report_.seconds.scan);
+    report_.seconds.scan += watch_.lap();
   }
 
   ImportReport run() {
     describe();
     for (int y = 0; y < shape().height(); y += ingest_->band_rows()) {
       const Ingest::Band band = ingest_->read_band(y, std::min(shape().height(), y + ingest_->band_rows()));
-      watch_.add_to(report_.seconds.scan);
+      report_.seconds.scan += watch_.lap();
       digest(band);
       measure(band);
-      watch_.add_to(report_.seconds.errors);
+      report_.seconds.errors += watch_.lap();
       for (const Lattice& l : band.levels) encode(l, band.y0 >> l.level(), chunk_end(l, band.y1), &band);
       say(0.2 + 0.7 * double(band.y1) / shape().height());
     }
     for (int l = Ingest::kStreamedLevels; l < shape().levels(); ++l)
       encode(ingest_->coarse(l), 0, shape().lattice_rows(l), nullptr);
-    watch_.add_to(report_.seconds.encode);
+    report_.seconds.encode += watch_.lap();
     finish_grid();
     if (!report_.duplicate_of.empty()) return report_;
     add_to_state();
@@ -195,12 +183,12 @@ class Importer {
           blobs[size_t(cy - first) * size_t(across) + size_t(cx)] =
               encode_chunk(cut_chunk(l, cx, cy, band), up ? &parent : nullptr, cx, cy);
     });
-    watch_.add_to(report_.seconds.encode);
+    report_.seconds.encode += watch_.lap();
     for (std::size_t k = 0; k < blobs.size(); ++k) {
       const PatchId id = PatchId::make(grid_.info.id, l.level(), int(k) % across, first + int(k) / across);
       db_.store->put_blob(Store::Kind::payload, id.value, blobs[k]);
     }
-    watch_.add_to(report_.seconds.store);
+    report_.seconds.store += watch_.lap();
   }
 
   Chunk cut_codes(const Lattice& l, int cx, int cy) const {
@@ -319,10 +307,10 @@ class Importer {
     if (!options_.replace.empty()) restate.remove(db_.place(options_.replace));
     db_.store->update_grid(grid_.info);
     restate.add(std::move(grid_));
-    watch_.add_to(report_.seconds.invariant);
+    report_.seconds.invariant += watch_.lap();
     const Extent& there = report_.extent;
     restate.store((options_.replace.empty() ? "import " : "replace ") + report_.name, there);
-    watch_.add_to(report_.seconds.store);
+    report_.seconds.store += watch_.lap();
     const Restate::Effect& e = restate.effect();
     report_.patches = e.added, report_.dormant = e.dormant, report_.hidden = e.hidden,
     report_.lowered = e.lowered, report_.woken = e.woken, report_.removed = e.removed;
@@ -354,9 +342,9 @@ void settle_crs(Database::Impl& db, const RasterSource& source) {
 }
 
 ImportReport Database::import(const RasterSource& source, const ImportOptions& options) {
-  const double start = now();
+  const Stopwatch watch;
   ImportReport report;
-  double committing = start;
+  double committing = 0;
   impl_->change([&] {
     if (options.progress) options.progress(0);
     settle_crs(*impl_, source);
@@ -366,17 +354,17 @@ ImportReport Database::import(const RasterSource& source, const ImportOptions& o
         throw Error(source.path(), "the database has a grid named " + options.name + " already",
                     "give another with --name, or take its place with --replace " + options.name);
     report = Importer(*impl_, source, options).run();
-    committing = now();
+    committing = watch.seconds();
     if (options.progress) options.progress(1);
     return !options.dry_run && report.duplicate_of.empty();
   });
-  report.seconds.store += now() - committing;
-  report.seconds.total = now() - start;
+  report.seconds.store += watch.seconds() - committing;
+  report.seconds.total = watch.seconds();
   return report;
 }
 
 RemoveReport Database::remove(const std::string& name) {
-  const double start = now();
+  const Stopwatch watch;
   RemoveReport report{.name = name, .extent = {}};
   impl_->change([&] {
     const std::size_t place = impl_->place(name);
@@ -389,7 +377,7 @@ RemoveReport Database::remove(const std::string& name) {
     report.patches = e.removed, report.woken = e.woken, report.raised = e.raised;
     return true;
   });
-  report.seconds = now() - start;
+  report.seconds = watch.seconds();
   return report;
 }
 

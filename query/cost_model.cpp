@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <chrono>
 #include <cmath>
+
+#include "db/stopwatch.h"
 
 namespace patchwork {
 
@@ -15,10 +16,6 @@ constexpr double kUsed = 0.9;                // of a time budget, by what is exp
 constexpr double kRung = 1.189207115002721;  // a quarter octave
 constexpr int kRungs = 96;
 constexpr int kTries = 12;  // to keep to a time budget that an answer has missed
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 double largest_error(const Database& db) {
   const Database::Reading reading = db.reading();
@@ -32,8 +29,8 @@ double largest_error(const Database& db) {
 
 CostModel calibrate(const Database& db) {
   std::vector<Measured> costs;
-  const double start = now();
-  for (double error = largest_error(db); costs.size() < 4 || now() - start < kCalibration; error /= 2) {
+  const Stopwatch watch;
+  for (double error = largest_error(db); costs.size() < 4 || watch.seconds() < kCalibration; error /= 2) {
     if (costs.size() > std::size_t(kRungs)) break;
     const UniformCut cut{.error = error};
     std::array<Cost, 3> three;  // the first one reads what was not read before

@@ -1,11 +1,11 @@
 #include "render/renderer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "query/cut.h"
 #include "render/tile_seams.h"
 #include "render/tile_supply.h"
@@ -14,11 +14,6 @@
 namespace patchwork {
 
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double ms_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 // The middle of all heights, where float32 loses least.
 double middle_height(const Database& db) {
@@ -205,7 +200,7 @@ struct Renderer::Impl {
 };
 
 FrameStats Renderer::Impl::draw(const Camera& from) {
-  const auto start = Clock::now();
+  const Stopwatch watch;
   FrameStats stats;
   stats.pixels_asked = options.pixel_error, stats.workers_held = holding;
   camera = from, camera.width = options.width, camera.height = options.height;
@@ -230,7 +225,7 @@ FrameStats Renderer::Impl::draw(const Camera& from) {
     submit(stats);
   }
   stats.light_left = effects.light_left();
-  stats.total_ms = ms_since(start);
+  stats.total_ms = watch.milliseconds();
   return stats;
 }
 

@@ -1,17 +1,13 @@
 #include "render/tile_supply.h"
 
 #include <algorithm>
-#include <chrono>
 
+#include "db/stopwatch.h"
 #include "render/vulkan/tile_store_impl.h"
 
 namespace patchwork {
 
 namespace {
-
-double ms_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
 
 void note_made(const TileMakerCounts& before, const TileMakerCounts& after, FrameStats& stats) {
   stats.tiles_made = after.tiles - before.tiles, stats.patches_sent = after.patches - before.patches;
@@ -42,11 +38,11 @@ TileSupply::TileSupply(std::shared_ptr<Device> device, const Database& db, const
 }
 
 void TileSupply::select(const Frustum& frustum, FrameStats& stats) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   select_tiles(lattice_, frustum, {options_.pixel_error, most_tiles_}, cache_, selection_);
   wanted_.clear();
   for (const Selection::Wanted& w : selection_.wanted) wanted_.push_back(w.key);
-  stats.select_ms += ms_since(start);
+  stats.select_ms += watch.milliseconds();
 }
 
 // Level by level, the coarsest first; false if nothing could be made.
@@ -70,9 +66,9 @@ bool TileSupply::make_fetched() {
   const auto most = std::size_t(std::max(1.0, options_.make_ms / ms_a_tile_));
   const std::vector<TileKey> fetched = fetcher_->take(wanted_, most);
   if (fetched.empty()) return false;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   if (!make(fetched)) return false;
-  ms_a_tile_ += 0.2 * (ms_since(start) / double(fetched.size()) - ms_a_tile_);
+  ms_a_tile_ += 0.2 * (watch.milliseconds() / double(fetched.size()) - ms_a_tile_);
   return true;
 }
 

@@ -127,10 +127,6 @@ void note(const Common& common, const std::string& text) {
   if (!common.quiet) std::fputs((text + "\n").c_str(), stderr);  // fmt::print throws where stderr is full
 }
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 Json to_json(const Extent& e) { return {e.xmin, e.ymin, e.xmax, e.ymax}; }
 std::string to_text(const Extent& e) {
   const auto millimetres = [](double v) { return std::round(v * 1000) / 1000 + 0.0; };  // -0 becomes 0

@@ -102,7 +102,6 @@ struct RegionOptions {
 void print(const Json& document);
 /// A warning or a note on stderr, not with --quiet.
 void note(const Common& common, const std::string& text);
-double seconds_since(std::chrono::steady_clock::time_point start);
 Json to_json(const Extent& e);
 /// xmin ymin xmax ymax to a millimetre.
 std::string to_text(const Extent& e);

@@ -3,11 +3,10 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "db/error.h"
-#include "tools/cli.h"
+#include "db/stopwatch.h"
 
 namespace patchwork::cli {
 
@@ -53,7 +52,7 @@ Resampler::Resampler(const Evaluator& blend, const Raster& raster, std::vector<s
 }
 
 void Resampler::rows(int factor, int row, int rows, std::span<float* const> bands) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   if (whole_.empty()) {
     evaluate(factor, row, rows, bands);
   } else {
@@ -70,7 +69,7 @@ void Resampler::rows(int factor, int row, int rows, std::span<float* const> band
       }
     });
   }
-  tally_.blend_seconds += seconds_since(start);
+  tally_.blend_seconds += watch.seconds();
 }
 
 void Resampler::evaluate_whole(std::span<float* const> planes) {
@@ -120,13 +119,13 @@ void Resampler::evaluate(int factor, int row, int rows, std::span<float* const> 
 }
 
 double prefetch(const Database& db, std::span<const PatchId> patches, std::size_t memory) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   if (patches.size() * sizeof(PatchSurface) > memory / 32) return 0;
   // By place, not by priority: neighbours are cut from the same chunks.
   std::vector<PatchId> order(patches.begin(), patches.end());
   std::sort(order.begin(), order.end());
   tbb::parallel_for(size_t(0), order.size(), [&](std::size_t k) { db.surface(order[k]); });
-  return seconds_since(start);
+  return watch.seconds();
 }
 
 }  // namespace patchwork::cli

@@ -1,11 +1,11 @@
 #include "render/vulkan/light_map_impl.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <utility>
 
+#include "db/stopwatch.h"
 #include "query/extract.h"
 #include "render/vulkan/shaders.h"
 
@@ -43,10 +43,6 @@ double finest_step(const Database& db) {
   double finest = INFINITY;
   for (const Grid& g : db.grids()) finest = std::min(finest, g.info.frame.finer_step());
   return finest;
-}
-
-double ms_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
 bool same(const effects::Sun& a, const effects::Sun& b) {
@@ -99,7 +95,7 @@ std::size_t LightMap::samples_left() const {
 
 void LightMap::take_heights(const Database& db, int smoothness, double ms) {
   if (db.grids().empty()) return;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const Extent e = db.extent();
   const double longest = std::max(e.xmax - e.xmin, e.ymax - e.ymin);
   const int side = int(std::clamp(longest / finest_step(db) + 1, 2., double(kSide)));
@@ -113,7 +109,7 @@ void LightMap::take_heights(const Database& db, int smoothness, double ms) {
   std::vector<bool>& missing = heights_->missing;
   for (std::size_t b = 0; b < missing.size(); ++b) {
     if (!missing[b]) continue;
-    if (ms_since(start) > ms) return;
+    if (watch.milliseconds() > ms) return;
     take_block(db, smoothness, 0.1 * longest / side, b);
     missing[b] = false;
   }

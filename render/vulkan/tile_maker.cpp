@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cassert>
-#include <chrono>
 #include <cmath>
 
 #include "blend/vulkan/vulkan_blend_impl.h"
+#include "db/stopwatch.h"
 #include "query/extract.h"
 #include "render/tile_cut.h"
 #include "render/vulkan/shaders.h"
@@ -29,10 +29,6 @@ struct FinishPush {
   float shift, between;
   std::uint32_t source_at;
 };
-
-double ms_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
 
 Extent with_halo(const TileLattice& lattice, const TileKey& key) {
   Extent e = lattice.bounds(key);
@@ -196,7 +192,7 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
   for (const TileKey& k : tiles) sampled.push_back(sampled_tile(lattice, k));
   VulkanBlend::Impl& b = blend->impl();
   const RasterFrame frame = lattice.frame();
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch blending;
   const BlockShares before = blend->shares();
   double finishing = 0;
   const BlendCounts now = b.run(
@@ -207,7 +203,7 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
         return work;
       },
       [&](const vk::Frame& submission, std::size_t first, std::size_t n) {
-        const auto begun = std::chrono::steady_clock::now();
+        const Stopwatch watch;
         run_finish(submission, to.subspan(first, n));
         ++counts.dispatches;
         for (std::size_t k = 0; k < n; ++k) {
@@ -216,7 +212,7 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
               lattice.error(key.level) > 0 && is_improvable(db, sorted, with_halo(lattice, key));
           made.push_back({key, summary(k, key, facts[first + k], improvable), to[first + k]});
         }
-        finishing += ms_since(begun);
+        finishing += watch.milliseconds();
       });
   const BlockShares after = blend->shares();
   counts.blocks.out += after.out - before.out, counts.blocks.inside += after.inside - before.inside;
@@ -224,7 +220,7 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
   counts.blended.points += now.points, counts.blended.contributions += now.contributions;
   counts.blended.most = std::max(counts.blended.most, now.most);
   counts.blended.bound_max = std::max(counts.blended.bound_max, now.bound_max);
-  counts.blend_ms += ms_since(start) - finishing, counts.finish_ms += finishing;
+  counts.blend_ms += blending.milliseconds() - finishing, counts.finish_ms += finishing;
 }
 
 std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tiles,
@@ -232,18 +228,18 @@ std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tile
   std::vector<Made> made;
   if (tiles.empty()) return made;
   const int level = tiles.front().level;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch extracting;
   std::vector<Extent> places;
   for (const TileKey& k : tiles) places.push_back(with_halo(lattice, k));
   const Extraction x = extract(db, TileCut(lattice.error(level), places));
-  counts.extract_ms += ms_since(start);
+  counts.extract_ms += extracting.milliseconds();
   if (x.patches.empty()) {
     for (const TileKey& k : tiles) made.push_back({k, {}, TileCache::kNoSlot});
     return made;
   }
-  const auto sending = std::chrono::steady_clock::now();
+  const Stopwatch sending;
   use(x.patches);
-  counts.send_ms += ms_since(sending);
+  counts.send_ms += sending.milliseconds();
   std::vector<PatchId> sorted = x.patches;
   std::sort(sorted.begin(), sorted.end());
   std::vector<TileKey> filled;

@@ -4,12 +4,12 @@
 #include <oneapi/tbb/global_control.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 
 #include "blend/vulkan/vulkan_blend.h"
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/process.h"
 #include "tools/resampler.h"
@@ -43,9 +43,9 @@ void race(std::vector<Contestant>& all) {
   for (int r = 0; r <= most; ++r)
     for (Contestant& c : all) {
       if (r > c.runs) continue;
-      const auto start = std::chrono::steady_clock::now();
+      const Stopwatch watch;
       c.run();
-      if (r > 0) c.seconds.push_back(seconds_since(start));
+      if (r > 0) c.seconds.push_back(watch.seconds());
     }
 }
 

@@ -1,7 +1,6 @@
 // What a client on the other end of a wire needs to follow a view: bytes a frame of differences, and how many
 // of their patches a prediction had fetched before. And what an answer costs that must keep to a time.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <set>

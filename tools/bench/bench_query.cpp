@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <random>
 
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "query/extract.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/box_indexes.h"
@@ -16,10 +16,6 @@
 namespace patchwork::cli {
 
 namespace {
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 class QueryBench {
  public:
@@ -88,13 +84,13 @@ class QueryBench {
     constexpr double kLeast = 0.15;
     std::size_t asked = 0;
     Ids ids;
-    const double start = now();
+    const Stopwatch watch;
     double passed = 0;
     for (std::size_t k = 0; passed < kLeast; k = (k + 1) % questions.size()) {
       ids.clear(), index.find(questions[k], ids), ++asked;
-      if (asked % 8 == 0 || passed == 0) passed = now() - start;
+      if (asked % 8 == 0 || passed == 0) passed = watch.seconds();
     }
-    return double(asked) / (now() - start);
+    return double(asked) / watch.seconds();
   }
 
   Question uniform(double error, const Extent& region) const {

@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <chrono>
 #include <cstring>
 #include <random>
 
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "query/extract.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/process.h"
@@ -21,10 +21,6 @@ namespace patchwork::cli {
 namespace {
 
 constexpr int kReaders = 4, kQueries = 64, kQueriesAState = 8;
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 std::vector<UniformCut> make_queries(const Extent& all, std::uint64_t seed) {
   std::mt19937_64 random(seed);
@@ -124,15 +120,15 @@ class ReadersBench {
     Tally tally;
     std::vector<double> latencies;
     Database db = Database::open(database());
-    for (const double end = now() + seconds; now() < end;) {
+    for (const Stopwatch reading; reading.seconds() < seconds;) {
       try {
         tally.states += db.refresh();
         std::array<bool, 2> fits{true, true};
         for (int n = 0; n < kQueriesAState; ++n, ++tally.queries) {
           const std::size_t q = random() % queries_.size();
-          const double start = now();
+          const Stopwatch asking;
           const std::uint64_t answer = answer_of(db, queries_[q]);
-          latencies.push_back(1000 * (now() - start));
+          latencies.push_back(asking.milliseconds());
           for (std::size_t s = 0; s < fits.size(); ++s) fits[s] = fits[s] && states_[s][q] == answer;
         }
         tally.inconsistent += !fits[0] && !fits[1];
@@ -161,7 +157,7 @@ class ReadersBench {
       if (child == 0) read(r, seconds, ends[1]);
       close(ends[1]), pipes.push_back(ends[0]), readers.push_back(child);
     }
-    for (const double end = now() + seconds; writing && now() < end; commits_ += 2)
+    for (const Stopwatch watch; writing && watch.seconds() < seconds; commits_ += 2)
       write(with_survey()), write({"remove", database(), "survey_1"});
     std::vector<double> all;
     for (const int from : pipes) receive(from, all);

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "db/stopwatch.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/process.h"
 #include "tools/bench/truth_check.h"
@@ -121,12 +122,12 @@ class ResampleBench {
     Resampler resampler(blend, raster, {"height"}, 0);  // rows as they are asked for, each time
     std::vector<float> rows(size_t(raster.width) * size_t(kEvaluationRows));
     for (int r = 0; r <= o_.runs; ++r) {
-      const auto start = std::chrono::steady_clock::now();
+      const Stopwatch watch;
       for (int row = 0; row < raster.height; row += kEvaluationRows) {
         float* const band = rows.data();
         resampler.rows(1, row, std::min(kEvaluationRows, raster.height - row), {&band, 1});
       }
-      if (r > 0) evaluation_.push_back(seconds_since(start));
+      if (r > 0) evaluation_.push_back(watch.seconds());
     }
     patches_ = x.patches.size();
     const BlendCounts& c = resampler.tally().full;

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <thread>
 
+#include "db/stopwatch.h"
 #include "render/renderer.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/process.h"
@@ -25,8 +25,6 @@ constexpr double kFlightSeconds = 2.5, kSettleSeconds = 0.5;
 constexpr double kFirstSeconds = 3;  // until all is read
 constexpr double kSlowest = 100;     // metres a second; doubled while it goes well
 constexpr int kDoublings = 9;
-
-using Clock = std::chrono::steady_clock;
 
 // Where the camera is on a path of a kind, `way` metres after its beginning.
 class Path {
@@ -159,20 +157,17 @@ struct Flown {
 
 Flown fly(Renderer& r, Database& db, const Path& path, double speed, double settle, double& way) {
   Flown f;
-  const auto start = Clock::now();
-  const auto seconds_since = [](Clock::time_point t) {
-    return std::chrono::duration<double>(Clock::now() - t).count();
-  };
-  auto before = start;
+  const Stopwatch flight;
+  Stopwatch frame;
   for (;;) {
-    const auto begun = Clock::now();
+    const Stopwatch watch;
     const bool moved = r.refresh(db);
-    const double refreshing = 1000 * seconds_since(begun);
+    const double refreshing = watch.milliseconds();
     const FrameStats s = r.draw(path.at(way));
-    way += speed * seconds_since(before), before = Clock::now();
-    if (seconds_since(start) < settle) continue;
+    way += speed * frame.lap();
+    if (flight.seconds() < settle) continue;
     f.add(s), f.moves += moved, f.refresh += refreshing;
-    if (seconds_since(start) > settle + kFlightSeconds) return f;
+    if (flight.seconds() > settle + kFlightSeconds) return f;
   }
 }
 

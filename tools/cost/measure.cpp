@@ -10,6 +10,7 @@
 
 #include "blend/vulkan/vulkan_blend.h"
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "tools/bench/bench.h"
 #include "tools/cost/check_points.h"
 #include "tools/cost/frames.h"
@@ -107,10 +108,10 @@ class Bench {
   // them.
   static MeasuredRun several(const MeasuredRun& once) {
     return [&once](Stages& ms) {
-      const auto begun = std::chrono::steady_clock::now();
+      const Stopwatch watch;
       int runs = 0;
       do once(ms);
-      while (++runs < kMostOfAVisit && seconds_since(begun) < kVisit);
+      while (++runs < kMostOfAVisit && watch.seconds() < kVisit);
     };
   }
 
@@ -210,18 +211,18 @@ class Bench {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(s.threads));
     const Extraction x = extract(*s.db, *s.cut);
     const Database fresh = Database::open(s.db->path(), memory_);  // nothing of it is in memory yet
-    const auto fetching = std::chrono::steady_clock::now();
+    const Stopwatch fetching;
     prefetch(fresh, x.patches, memory_);
     std::unique_ptr<Evaluator> surface;
     if (s.vulkan) surface = evaluator(s, fresh, x);  // what is sent to the card
-    const double fetch = seconds_since(fetching);
-    const auto blending = std::chrono::steady_clock::now();
+    const double fetch = fetching.milliseconds();
+    const Stopwatch blending;
     if (!surface) surface = evaluator(s, fresh, x);
     std::vector<float> heights(std::size_t(s.side) * std::size_t(s.side));
     surface->at_pixels(frame(s), s.side, 0, s.side,
                        {.height = {}, .bound = {}, .source = {}, .patch = {}, .height32 = heights});
-    ms.query.push_back(1e3 * x.cost.seconds), ms.fetch.push_back(1e3 * fetch);
-    ms.blend.push_back(1e3 * seconds_since(blending));
+    ms.query.push_back(1e3 * x.cost.seconds), ms.fetch.push_back(fetch);
+    ms.blend.push_back(blending.milliseconds());
   }
 
   void add(const std::vector<Setting>& settings) {

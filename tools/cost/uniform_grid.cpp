@@ -3,11 +3,11 @@
 #include <gdal_priv.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "tools/resampler.h"
 
 namespace patchwork::cli {
@@ -138,12 +138,12 @@ double UniformGrid::read(int level, const Extent& window, int side) const {
             height = std::clamp(int(std::ceil(how.dfYOff + how.dfYSize)) - y, 1, l.height - y);
   if (how.dfXSize < side) how.eResampleAlg = GRIORA_Bilinear;
   std::vector<float> out(std::size_t(side) * std::size_t(side));
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const GDALDatasetUniquePtr file = open_level(path_, level, std::max(width, height) > kFewBlocks);
   check(file->GetRasterBand(1)->RasterIO(GF_Read, x, y, width, height, out.data(), side, side, GDT_Float32, 0,
                                          0, &how),
         path_);
-  return 1e3 * seconds_since(start);
+  return watch.milliseconds();
 }
 
 }  // namespace patchwork::cli

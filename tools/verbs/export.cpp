@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "tools/cli.h"
 #include "tools/output_file.h"
 #include "tools/sample_dataset.h"
@@ -21,7 +22,7 @@ const Grid& grid_named(const Database& db, const std::string& name) {
 }
 
 void run(const Options& o, const Common& common) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const Database db = Database::open(o.database, common.memory);
   refuse_overwriting(o.database, {o.file});
   const Grid& grid = grid_named(db, o.name);
@@ -37,7 +38,7 @@ void run(const Options& o, const Common& common) {
            {"height", grid.info.shape.height()},
            {"type", type},
            {"quantisation", grid.info.quantisation},
-           {"seconds", seconds_since(start)}});
+           {"seconds", watch.seconds()}});
   else if (!common.quiet)
     fmt::print("{}: {} x {} samples of {} in {}\n", o.name, grid.info.shape.width(), grid.info.shape.height(),
                type, o.file);

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "tools/cli.h"
 #include "tools/output_file.h"
 #include "tools/scene_setup.h"
@@ -129,17 +130,17 @@ class Film {
     const int k = total.frames;
     total.add(s);
     if (o_.stats) per_frame.push_back(facts(s));
-    const auto writing = std::chrono::steady_clock::now();
+    const Stopwatch writing;
     const auto name = [&](const std::string& path) { return number ? numbered(path, k) : path; };
     write_picture(name(o_.out), renderer_.picture());
     if (!o_.depth.empty()) write_depth(name(o_.depth), renderer_.depth(), scene_.width, scene_.height);
-    total.write += seconds_since(writing);
+    total.write += writing.seconds();
   }
 
   // Another picture for each change that comes within the time.
   void follow(const Camera& view, Database& db, double seconds) {
-    const auto start = std::chrono::steady_clock::now();
-    while (seconds_since(start) < seconds) {
+    const Stopwatch watch;
+    while (watch.seconds() < seconds) {
       if (renderer_.refresh(db))
         shoot(view, true);
       else
@@ -163,7 +164,7 @@ class Film {
 };
 
 void run(const Options& o, const Common& common) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
   refuse_overwriting(o.database, {o.out, o.depth});
@@ -181,7 +182,7 @@ void run(const Options& o, const Common& common) {
   }
   if (o.follow > 0) film.follow(views.back(), db, o.follow);
   const Total& t = film.total;
-  Json document = summary(t, scene, film.device(), seconds_since(start));
+  Json document = summary(t, scene, film.device(), watch.seconds());
   document["tessellation"] = film.tessellation();
   if (o.stats) document["per_frame"] = film.per_frame;
   if (common.json || o.stats) return print(document);
@@ -190,7 +191,7 @@ void run(const Options& o, const Common& common) {
       "{}: {} picture{} of {} x {}, {:.3g} px of error asked, {:.3g} reached, bound at most {:.4g} m, {:.2f} "
       "s\n",
       o.out, t.frames, t.frames == 1 ? "" : "s", scene.width, scene.height, scene.pixel_error,
-      t.pixels_reached, t.bound_max, seconds_since(start));
+      t.pixels_reached, t.bound_max, watch.seconds());
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "render/hillshade.h"
 #include "render/patch_map.h"
 #include "tools/cli.h"
@@ -116,18 +117,18 @@ Extent to_micrometres(const Extent& e) {
 }
 
 void run(const Options& o, const Common& common) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const Database db = Database::open(o.database, common.memory);
   if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
   refuse_overwriting(o.database, {o.out, o.hillshade, o.map});
   const Extent extent = o.region.extent.empty() ? to_micrometres(db.extent()) : o.region.region().bounds();
   const Raster raster = Raster::covering(extent, o.step > 0 ? o.step : finest_step(db, extent));
-  const double open_seconds = seconds_since(start);
+  const double open_seconds = watch.seconds();
   const Extraction x = extract(
       db, {.error = o.surface.error, .region = Region::inside(raster.extent()), .strict = o.surface.strict});
   const double fetch_seconds = prefetch(db, x.patches, common.memory);
   const std::unique_ptr<Evaluator> blend = make_evaluator(db, x.patches, o.surface, common.memory);
-  const auto writing = std::chrono::steady_clock::now();
+  const Stopwatch writing;
   std::optional<ProgressBar> bar;
   bar.emplace(common, "resample", double(raster.width) * raster.height / 1e6, "Mpx");
   Resampler resampler(*blend, raster, o.bands, common.memory,
@@ -140,21 +141,21 @@ void run(const Options& o, const Common& common) {
       },
       [&](double share) { bar->show(before + (1 - before) * share); });
   bar.reset();
-  const double write_seconds = seconds_since(writing) - resampler.tally().blend_seconds;
-  const auto drawing = std::chrono::steady_clock::now();
+  const double write_seconds = writing.seconds() - resampler.tally().blend_seconds;
+  const Stopwatch drawing;
   const Raster small = picture_raster(raster);
   if (!o.hillshade.empty()) draw_hillshade(*blend, small, o, x);
   if (!o.map.empty()) draw_map(db, Blend(db, x.patches, o.surface.blend_options()), small, o, x);
   const BlendCounts& c = resampler.tally().full;
   const double mean = c.points ? double(c.contributions) / double(c.points) : 0;
-  const double seconds = seconds_since(start);
+  const double seconds = watch.seconds();
   if (common.json) {
     Json j{{"seconds", seconds},       {"samples", c.points},       {"patches", x.patches.size()},
            {"bound_max", c.bound_max}, {"contributors_mean", mean}, {"contributors_max", c.most},
            {"width", raster.width},    {"height", raster.height},   {"engine", engine_name(*blend)}};
     j["stages"] = {{"open", open_seconds},   {"query", x.cost.seconds},
                    {"fetch", fetch_seconds}, {"blend", resampler.tally().blend_seconds},
-                   {"write", write_seconds}, {"pictures", seconds_since(drawing)}};
+                   {"write", write_seconds}, {"pictures", drawing.seconds()}};
     print(j);
   } else if (!common.quiet) {
     fmt::print(

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
+#include "db/stopwatch.h"
 #include "query/extract.h"
 #include "render/tile_cut.h"
 #include "tools/cli.h"
@@ -213,10 +214,10 @@ double Viewer::frame(const WindowInput& input) {
   const FrameStats stats = renderer_.draw(camera());
   restless_ |= changed || reshaped || stats.redrawn || stats.tiles_made > 0;
   const bool other_panels = lay_panels();
-  const auto start = Clock::now();
+  const Stopwatch watch;
   const bool shows = stats.redrawn || other_panels || reshaped || input.damaged || options_.frames > 0;
   if (shows) window_.show(renderer_, panels_);
-  meter_.add(stats, 1000 * seconds_since(start));
+  meter_.add(stats, watch.milliseconds());
   if (stats.redrawn || moves_ || options_.frames > 0) return 0;
   return stats.tiles_wanted > 0 ? kFetchWait : kIdleWait;
 }

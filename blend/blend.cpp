@@ -16,17 +16,9 @@ namespace {
 
 constexpr std::size_t kParallelPoints = 16384;  // smaller parts are done by one thread
 
-struct Tally {
-  BlendCounts counts;
-  void add(const BlendCounts& c) {
-    counts.points += c.points, counts.contributions += c.contributions;
-    counts.most = std::max(counts.most, c.most), counts.bound_max = std::max(counts.bound_max, c.bound_max);
-  }
-};
-
 struct Worker {
   Batch batch;
-  Tally tally;
+  BlendCounts counts;
 };
 
 // What both kinds of evaluation share.
@@ -39,14 +31,14 @@ struct Run {
 
   bool priority() const { return options.composition == Composition::priority; }
   BlendCounts counts() {
-    Tally all;
-    for (const Worker& w : workers) all.add(w.tally.counts);
-    return all.counts;
+    BlendCounts all;
+    for (const Worker& w : workers) all += w.counts;
+    return all;
   }
   void compose(Worker& w, const Candidates& candidates, bool inside) const {
     const bool named = !out.source.empty() || !out.patch.empty();
     w.batch.compose(db, placed, candidates, inside, named, options);
-    w.tally.add(w.batch.counts);
+    w.counts += w.batch.counts;
   }
   // Points [k, k + n) of the batch go to the places from `to` on.
   void put(const Batch& batch, std::size_t k, std::size_t n, std::size_t to) const {

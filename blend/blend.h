@@ -1,6 +1,7 @@
 // The height at a point: patches of an extraction composed to one C^k surface with a bound.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -38,6 +39,15 @@ struct BlendOutput {
 struct BlendCounts {
   std::uint64_t points = 0, contributions = 0, most = 0;
   double bound_max = 0;  ///< metres
+
+  /// What two evaluations counted together.
+  BlendCounts& operator+=(const BlendCounts& o) {
+    points += o.points, contributions += o.contributions;
+    most = std::max(most, o.most), bound_max = std::max(bound_max, o.bound_max);
+    return *this;
+  }
+  /// Patches read a point; 0 without points.
+  double mean() const { return points ? double(contributions) / double(points) : 0; }
 };
 
 /// Points of a raster: pixel (c, r) lies at (x0 + xc c + xr r, y0 + yc c + yr r).

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "db/basis.h"
+#include "db/float_rounding.h"
 
 namespace patchwork {
 
@@ -15,11 +16,6 @@ namespace {
 
 constexpr int kSide = PatchSurface::kSide;
 constexpr float kNothing = -std::numeric_limits<float>::infinity();
-
-float up(double v) {
-  const auto f = float(v);
-  return double(f) < v ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
-}
 
 // The largest of `sign` (1 or -1) times the codes that an interpolant takes over cells [i0, i1) x [j0, j1)
 // (window): the largest sample and, where it is not linear, an eighth of the largest second differences it
@@ -70,9 +66,9 @@ HeightTree::HeightTree(const Database& db, const std::vector<Blend::Placed>& pla
         const double code =
             apart ? -INFINITY : sign * most_of(surface->codes.data(), sign, i0, j0, i1, j1, smoothness);
         float& h = blocks[std::size_t(j * kBlocks + i)];
-        h = apart ? kNothing : up(p.quantum * (p.origin + code) + p.base);
+        h = apart ? kNothing : float_at_least(p.quantum * (p.origin + code) + p.base);
         // The evaluator rounds elsewhere: a hair more.
-        if (!apart) h = up(double(h) + 1e-6 + 1e-9 * std::abs(double(h)));
+        if (!apart) h = float_at_least(double(h) + 1e-6 + 1e-9 * std::abs(double(h)));
         top[k] = std::max(top[k], h);
       }
   });
@@ -81,7 +77,7 @@ HeightTree::HeightTree(const Database& db, const std::vector<Blend::Placed>& pla
   entries.reserve(placed.size());
   for (std::size_t k = 0; k < placed.size(); ++k) {
     const Extent& e = placed[k].bounds;
-    entries.push_back({{e.xmin, e.ymin, e.xmax, e.ymax, 0, up(double(top[k]) - lowest_)}, {k}});
+    entries.push_back({{e.xmin, e.ymin, e.xmax, e.ymax, 0, float_at_least(double(top[k]) - lowest_)}, {k}});
   }
   tree_ = LodTree::build(std::move(entries));
 }

@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "db/cell_masks.h"
 #include "db/database_impl.h"
 #include "db/digest.h"
 #include "db/error.h"
+#include "db/float_rounding.h"
 #include "db/surface_pool.h"
 
 namespace patchwork {
@@ -26,15 +26,6 @@ constexpr const char* kRemark = "remark ";  // before the names of remarks among
 constexpr const char* kRestore =
     "see: patchwork check; restore the file from a copy, or import the grid again";
 constexpr const char* kRepair = "run: patchwork check --repair, which makes it from the patches";
-
-float round_down(double v) {
-  const float f = float(v);
-  return double(f) > v ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
-}
-float round_up(double v) {
-  const float f = float(v);
-  return double(f) < v ? std::nextafter(f, std::numeric_limits<float>::infinity()) : f;
-}
 
 // The samples of one patch's window, gathered from the chunks of its level.
 class Window : public CellSource {
@@ -106,7 +97,8 @@ class Window : public CellSource {
 LodBox lod_box(const GridInfo& grid, std::size_t index, const PatchRecord& patch) {
   const GridShape::Block b = grid.shape.block(index);
   const Extent e = grid.frame.bounds(grid.shape.domain(b.level, b.bx, b.by));
-  return {e.xmin, e.ymin, e.xmax, e.ymax, patch.best() ? 0.f : round_down(patch.bottom), round_up(patch.top)};
+  const float bottom = patch.best() ? 0.f : float_at_most(patch.bottom);
+  return {e.xmin, e.ymin, e.xmax, e.ymax, bottom, float_at_least(patch.top)};
 }
 
 Database::Impl::Impl(std::unique_ptr<Store> opened, std::size_t memory)

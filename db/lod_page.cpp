@@ -9,7 +9,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "db/vectorized.h"
 
@@ -206,11 +205,6 @@ bool contains(const LodBox& outer, const LodBox& inner) { return united(outer, i
 float error_octaves(float error) {
   const float bounded = error < kMostError ? error + kLeastError : kMostError;
   return float(std::bit_cast<std::int32_t>(bounded)) * 0x1p-23f;
-}
-
-float float_at_most(double error) {
-  const auto f = float(error);
-  return double(f) > error ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
 }
 
 LodPage::LodPage(std::uint32_t page_level) {

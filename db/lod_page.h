@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "db/float_rounding.h"
 #include "db/frame.h"
 #include "db/patch_id.h"
 
@@ -35,8 +36,6 @@ bool contains(const LodBox& outer, const LodBox& inner);
 /// An error (metres, 0 to infinity) on a scale of octaves, in which one step counts the same anywhere:
 /// piecewise linear between powers of two, finite at both ends.
 float error_octaves(float error);
-/// The largest float that is not above `error`.
-float float_at_most(double error);
 
 /// What a cut makes of a page: bit s is set in `met` if box s can belong to the answer, in `inside` if it
 /// lies in the region as a whole, so that what is below it need not be asked where it lies.

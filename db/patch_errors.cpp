@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "db/basis.h"
+#include "db/float_rounding.h"
 #include "db/vectorized.h"
 
 namespace patchwork {
@@ -218,11 +219,6 @@ class Reference {
   const Positions& positions_;
 };
 
-float rounded_up(double v) {
-  const auto f = float(v);
-  return double(f) < v ? std::nextafter(f, INFINITY) : f;
-}
-
 }  // namespace
 
 PatchErrors::PatchErrors(const GridShape& shape, const CellMasks& cells) : shape_(shape), cells_(cells) {
@@ -350,8 +346,8 @@ void PatchErrors::note(int level, int segment, const Positions& positions, int p
     for (int by = rows.first; by <= rows.last; ++by)
       for (int bx = cols.first; bx <= cols.last; ++bx) {
         Largest& block = out.blocks[size_t(by) * size_t(across) + size_t(bx)];
-        block.linear = std::max(block.linear, rounded_up(worst));
-        block.smooth = std::max(block.smooth, rounded_up(worst_smooth));
+        block.linear = std::max(block.linear, float_at_least(worst));
+        block.smooth = std::max(block.smooth, float_at_least(worst_smooth));
       }
   }
 }

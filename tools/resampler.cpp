@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "db/error.h"
+#include "db/float_rounding.h"
 #include "db/stopwatch.h"
 
 namespace patchwork::cli {
@@ -106,16 +107,12 @@ void Resampler::evaluate(int factor, int row, int rows, std::span<float* const> 
       if (bands_[b] == "bound")
         for (std::size_t k = from; k < to; ++k) {
           const double rounding = out.height32.empty() ? 0 : kHalfUlp * std::abs(double(out.height32[k]));
-          const double bound = bound_[k] + rounding;
-          const float e = float(bound);
-          f[k] = double(e) < bound ? std::nextafterf(e, INFINITY) : e;
+          f[k] = float_at_least(bound_[k] + rounding);
         }
     });
   }
   if (factor > 1) return;
-  tally_.full.points += c.points, tally_.full.contributions += c.contributions;
-  tally_.full.most = std::max(tally_.full.most, c.most);
-  tally_.full.bound_max = std::max(tally_.full.bound_max, c.bound_max);
+  tally_.full += c;
 }
 
 double prefetch(const Database& db, std::span<const PatchId> patches, std::size_t memory) {

@@ -35,9 +35,7 @@ std::uint64_t wanted_points(std::span<const Tile> tiles) {
 }  // namespace
 
 void add(BlendCounts& sum, const vk::TallyHead& t, std::uint64_t points) {
-  sum.points += points, sum.contributions += t.contributions;
-  sum.most = std::max<std::uint64_t>(sum.most, t.most);
-  sum.bound_max = std::max(sum.bound_max, double(std::bit_cast<float>(t.bound_max)));
+  sum += BlendCounts{points, t.contributions, t.most, double(std::bit_cast<float>(t.bound_max))};
 }
 
 namespace {

@@ -217,9 +217,7 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
   const BlockShares after = blend->shares();
   counts.blocks.out += after.out - before.out, counts.blocks.inside += after.inside - before.inside;
   counts.blocks.partial += after.partial - before.partial;
-  counts.blended.points += now.points, counts.blended.contributions += now.contributions;
-  counts.blended.most = std::max(counts.blended.most, now.most);
-  counts.blended.bound_max = std::max(counts.blended.bound_max, now.bound_max);
+  counts.blended += now;
   counts.blend_ms += blending.milliseconds() - finishing, counts.finish_ms += finishing;
 }
 

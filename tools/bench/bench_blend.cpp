@@ -235,7 +235,7 @@ class BlendBench {
             {"patches", c.cut->patches.size()},
             {"largest_difference", off},
             {"bound_max", counts.bound_max},
-            {"contributors_mean", double(counts.contributions) / double(counts.points)},
+            {"contributors_mean", counts.mean()},
             {"blocks", shares(card)},
             {"exact_share", double(card.exact_points()) / n / double(counts.points)},
             {"ms",

@@ -130,8 +130,7 @@ class ResampleBench {
       if (r > 0) evaluation_.push_back(watch.seconds());
     }
     patches_ = x.patches.size();
-    const BlendCounts& c = resampler.tally().full;
-    contributors_ = double(c.contributions) / double(c.points);
+    contributors_ = resampler.tally().full.mean();
   }
 
   void compare() {

@@ -61,8 +61,7 @@ struct Total {
     bound_max = std::max(bound_max, s.bound_max), pixels_reached = std::max(pixels_reached, s.pixels_reached);
     query += s.select_ms + s.extract_ms, fetch += s.send_ms, blend += s.blend_ms;
     tessellate += s.finish_ms + s.factors_ms, draw += s.draw_ms;
-    blended.points += s.blended.points, blended.contributions += s.blended.contributions;
-    blended.most = std::max(blended.most, s.blended.most);
+    blended += s.blended;
   }
 };
 
@@ -91,7 +90,6 @@ Json facts(const FrameStats& s) {
 }
 
 Json summary(const Total& t, const Scene& scene, const std::string& device, double seconds) {
-  const double points = std::max<double>(1, double(t.blended.points));
   return {{"seconds", seconds},
           {"frames", t.frames},
           {"pixels", std::size_t(scene.width) * std::size_t(scene.height) * std::size_t(t.frames)},
@@ -106,7 +104,7 @@ Json summary(const Total& t, const Scene& scene, const std::string& device, doub
             {"tessellate", t.tessellate / 1000},
             {"draw", t.draw / 1000},
             {"write", t.write}}},
-          {"contributors_mean", double(t.blended.contributions) / points},
+          {"contributors_mean", t.blended.mean()},
           {"contributors_max", t.blended.most},
           {"engine", device}};
 }

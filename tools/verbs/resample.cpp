@@ -147,12 +147,11 @@ void run(const Options& o, const Common& common) {
   if (!o.hillshade.empty()) draw_hillshade(*blend, small, o, x);
   if (!o.map.empty()) draw_map(db, Blend(db, x.patches, o.surface.blend_options()), small, o, x);
   const BlendCounts& c = resampler.tally().full;
-  const double mean = c.points ? double(c.contributions) / double(c.points) : 0;
   const double seconds = watch.seconds();
   if (common.json) {
-    Json j{{"seconds", seconds},       {"samples", c.points},       {"patches", x.patches.size()},
-           {"bound_max", c.bound_max}, {"contributors_mean", mean}, {"contributors_max", c.most},
-           {"width", raster.width},    {"height", raster.height},   {"engine", engine_name(*blend)}};
+    Json j{{"seconds", seconds},       {"samples", c.points},           {"patches", x.patches.size()},
+           {"bound_max", c.bound_max}, {"contributors_mean", c.mean()}, {"contributors_max", c.most},
+           {"width", raster.width},    {"height", raster.height},       {"engine", engine_name(*blend)}};
     j["stages"] = {{"open", open_seconds},   {"query", x.cost.seconds},
                    {"fetch", fetch_seconds}, {"blend", resampler.tally().blend_seconds},
                    {"write", write_seconds}, {"pictures", drawing.seconds()}};
@@ -161,7 +160,7 @@ void run(const Options& o, const Common& common) {
     fmt::print(
         "{}: {} x {} pixels of {:g} m from {} patches ({:.2f} a pixel, {} at most), bound at most {:.4g} m, "
         "{:.2f} s\n",
-        o.out, raster.width, raster.height, raster.step, x.patches.size(), mean, c.most, c.bound_max,
+        o.out, raster.width, raster.height, raster.step, x.patches.size(), c.mean(), c.most, c.bound_max,
         seconds);
   }
 }

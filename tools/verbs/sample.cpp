@@ -127,10 +127,9 @@ class Sampler {
 
   /// How many points there were, and how many patches were read for one.
   std::string summary() const {
-    const double mean = counts_.points ? double(counts_.contributions) / double(counts_.points) : 0;
     return fmt::format("{} point{} from {} patches on {}; {:.3f} patches read a point, {} at most",
                        counts_.points, counts_.points == 1 ? "" : "s", patches_.size(), engine_name(*blend_),
-                       mean, counts_.most);
+                       counts_.mean(), counts_.most);
   }
 
  private:
@@ -155,10 +154,8 @@ class Sampler {
 
   void flush() {
     height_.resize(x_.size()), bound_.resize(x_.size()), source_.resize(x_.size());
-    const BlendCounts c =
+    counts_ +=
         blend_->at_points(x_, y_, {.height = height_, .bound = bound_, .source = source_, .patch = {}});
-    counts_.points += c.points, counts_.contributions += c.contributions,
-        counts_.most = std::max(counts_.most, c.most);
     fmt::memory_buffer out;
     for (std::size_t k = 0; k < x_.size(); ++k) {
       if (source_[k] == 0) {

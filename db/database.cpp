@@ -309,6 +309,7 @@ std::vector<Change> Database::changed_since(std::uint64_t version) const {
 const std::string& Database::crs() const { return impl_->crs; }
 std::span<const Grid> Database::grids() const { return impl_->grids; }
 const Grid& Database::grid(GridId id) const { return impl_->grids[impl_->place(id)]; }
+const Grid& Database::grid(const std::string& name) const { return impl_->grids[impl_->place(name)]; }
 PatchRecord Database::patch(PatchId id) const {
   const Reading reading = this->reading();
   return grid(id.grid()).at(id.level(), id.bx(), id.by());
@@ -324,6 +325,25 @@ Extent Database::extent() const {
   Extent all = Extent::nothing();
   for (const Grid& g : impl_->grids) all.add(g.info.bounds());
   return all;
+}
+
+double HeightRange::middle() const {
+  return lowest <= highest ? std::nearbyint(0.5 * (lowest + highest)) : 0;
+}
+
+HeightRange Database::heights() const {
+  HeightRange all;
+  for (const Grid& g : impl_->grids)
+    all.lowest = std::min(all.lowest, g.info.lowest), all.highest = std::max(all.highest, g.info.highest);
+  return all;
+}
+
+double Database::coarsest_bottom() const {
+  const Reading reading = this->reading();
+  double most = 0;
+  for (const Grid& g : impl_->grids)
+    if (g.patches.size() > 0) most = std::max(most, g.patches[g.patches.size() - 1].bottom);
+  return most;
 }
 
 std::uint64_t Database::sample_bytes() const {

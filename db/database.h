@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <shared_mutex>
@@ -59,6 +60,13 @@ struct RemoveReport {
   double seconds = 0;
 };
 
+/// Metres; lowest > highest where there is none.
+struct HeightRange {
+  double lowest = std::numeric_limits<double>::infinity(), highest = -std::numeric_limits<double>::infinity();
+  /// To a metre; 0 where there is none.
+  double middle() const;
+};
+
 /// One state of a database file. Reading is safe from many threads, beside a writer in this or another
 /// process; refreshing, importing and removing are not, and move this object to a new state.
 class Database {
@@ -92,13 +100,17 @@ class Database {
   const std::string& crs() const;  ///< WKT2, empty where no grid named one
   std::span<const Grid> grids() const;
   const Grid& grid(GridId id) const;
+  const Grid& grid(const std::string& name) const;  ///< throws Error: there is none
   PatchRecord patch(PatchId id) const;
   const LodTree& tree() const;
   /// Held while references into a grid's records, or the tree's pages, are used: what is read stays in memory
   /// until then, and is let go of later when it takes more than a quarter of the memory setting.
   using Reading = std::shared_lock<std::shared_mutex>;
   Reading reading() const;
-  Extent extent() const;  ///< of all footprints
+  Extent extent() const;        ///< of all footprints
+  HeightRange heights() const;  ///< of all samples; none without grids
+  /// Metres: the largest bottom of the grids' coarsest patches; 0 without grids.
+  double coarsest_bottom() const;
   CoverageCounts coverage_counts() const;
   std::uint64_t file_bytes() const;
   std::uint64_t sample_bytes() const;  ///< of the raw samples of all grids

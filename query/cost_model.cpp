@@ -17,20 +17,13 @@ constexpr double kRung = 1.189207115002721;  // a quarter octave
 constexpr int kRungs = 96;
 constexpr int kTries = 12;  // to keep to a time budget that an answer has missed
 
-double largest_error(const Database& db) {
-  const Database::Reading reading = db.reading();
-  double most = 1;
-  for (const Grid& g : db.grids())
-    if (g.patches.size() > 0) most = std::max(most, 2 * g.patches[g.patches.size() - 1].bottom);
-  return most;
-}
-
 }  // namespace
 
 CostModel calibrate(const Database& db) {
   std::vector<Measured> costs;
   const Stopwatch watch;
-  for (double error = largest_error(db); costs.size() < 4 || watch.seconds() < kCalibration; error /= 2) {
+  double error = std::max(1.0, 2 * db.coarsest_bottom());
+  for (; costs.size() < 4 || watch.seconds() < kCalibration; error /= 2) {
     if (costs.size() > std::size_t(kRungs)) break;
     const UniformCut cut{.error = error};
     std::array<Cost, 3> three;  // the first one reads what was not read before

@@ -15,14 +15,6 @@ namespace patchwork {
 
 namespace {
 
-// The middle of all heights, where float32 loses least.
-double middle_height(const Database& db) {
-  double lowest = INFINITY, highest = -INFINITY;
-  for (const Grid& g : db.grids())
-    lowest = std::min(lowest, g.info.lowest), highest = std::max(highest, g.info.highest);
-  return lowest <= highest ? std::nearbyint(0.5 * (lowest + highest)) : 0;
-}
-
 const Device::Impl& drawing(const Device& device) {
   if (!device.impl().cannot_draw.empty())
     throw Error(device.name(), "it cannot draw: " + device.impl().cannot_draw,
@@ -76,7 +68,7 @@ struct Renderer::Impl {
   const Device::Impl& card;
   RendererOptions options;
   TileLattice lattice;
-  double base;
+  double base;  // the middle of all heights, where float32 loses least
   vk::TileStore store;
   TileSupply supply;
   vk::Target target;
@@ -97,7 +89,7 @@ struct Renderer::Impl {
         card(drawing(*device)),
         options(resolved(o, card)),
         lattice(TileLattice::over(db)),
-        base(middle_height(db)),
+        base(db.heights().middle()),
         store(card, vk::TileStore::slots_within(card, o.memory / 2, holds(options)), holds(options)),
         supply(device, db, lattice, store, base, options),
         target(card, std::uint32_t(o.width), std::uint32_t(o.height)),

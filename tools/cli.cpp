@@ -9,6 +9,7 @@
 #include <map>
 
 #include "blend/vulkan/vulkan_blend.h"
+#include "db/error.h"
 
 namespace patchwork::cli {
 
@@ -20,6 +21,12 @@ CLI::App* verb(CLI::App& app, Common& common, const std::string& name, const std
       ->default_str("1GiB");
   v->add_option("--threads", common.threads, "threads to use; 0 means all cores")->check(CLI::Range(0, 1024));
   return v;
+}
+
+Database open_filled(const std::string& path, const Common& common) {
+  Database db = Database::open(path, common.memory);
+  if (db.grids().empty()) throw Error(path, "it holds no grid", "import one first");
+  return db;
 }
 
 ProgressBar::ProgressBar(const Common& common, std::string label, double total, std::string unit)

@@ -49,6 +49,9 @@ void add_bench(CLI::App& app, Common& common);
 /// A subcommand with the common options.
 CLI::App* verb(CLI::App& app, Common& common, const std::string& name, const std::string& what);
 
+/// Opens for reading; throws Error also where it holds no grid.
+Database open_filled(const std::string& path, const Common& common);
+
 /// Checks of an option's number; what is no number does not pass.
 CLI::Validator above_zero();
 CLI::Validator zero_or_more();

@@ -23,10 +23,8 @@ std::vector<Camera> cameras(const Database& db, const Scene& scene) {
     for (int k = 0; k < path.frames(); ++k) all.push_back(path.frame(k, scene.width, scene.height));
     return all;
   }
-  double lowest = INFINITY, highest = -INFINITY;
-  for (const Grid& g : db.grids())
-    lowest = std::min(lowest, g.info.lowest), highest = std::max(highest, g.info.highest);
-  return {overview(db.extent(), lowest, highest, 45, scene.width, scene.height)};
+  const HeightRange heights = db.heights();
+  return {overview(db.extent(), heights.lowest, heights.highest, 45, scene.width, scene.height)};
 }
 
 }  // namespace patchwork::cli

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
-#include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -59,10 +58,7 @@ void VulkanBlend::Impl::remember_grids() {
     if (places.size() <= id) places.resize(id + 1, 0);
     places[id] = std::int32_t(&g - db.grids().data()) + 1;
   }
-  double lowest = INFINITY, highest = -INFINITY;
-  for (const Grid& g : db.grids())
-    lowest = std::min(lowest, g.info.lowest), highest = std::max(highest, g.info.highest);
-  base = lowest <= highest ? std::nearbyint(0.5 * (lowest + highest)) : 0;
+  base = db.heights().middle();
 }
 
 // A cut that the pool has room for becomes resident as a whole, a larger one part by part as submissions need

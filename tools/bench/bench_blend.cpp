@@ -113,7 +113,7 @@ class BlendBench {
     ViewCut v{.eye = {extent_.xmin + 0.1 * side_, extent_.ymin + 0.1 * side_, 0},
               .look = {extent_.xmin + 0.6 * side_, extent_.ymin + 0.6 * side_, 0},
               .pixel_error = tolerance};
-    for (const Grid& g : db_->grids()) v.look.z = std::max(v.look.z, g.info.highest);
+    v.look.z = std::max(0.0, db_->heights().highest);
     v.eye.z = v.look.z + 0.05 * side_;
     return over_terrain_of(*db_, v);
   }

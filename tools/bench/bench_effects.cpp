@@ -27,8 +27,7 @@ SceneEffects sun_alone() {
 // Level with the highest ground, from a corner to the middle.
 Camera camera_of(const Database& db) {
   const Extent e = db.extent();
-  double highest = -INFINITY;
-  for (const Grid& g : db.grids()) highest = std::max(highest, g.info.highest);
+  const double highest = db.heights().highest;
   const double x = e.xmax - e.xmin, y = e.ymax - e.ymin;
   return {{e.xmin + 0.2 * x, e.ymin + 0.2 * y, highest + 0.02 * x},
           {e.xmin + 0.5 * x, e.ymin + 0.5 * y, highest - 0.05 * x},
@@ -38,10 +37,8 @@ Camera camera_of(const Database& db) {
 }
 
 double water_level(const Database& db) {
-  double lowest = INFINITY, highest = -INFINITY;
-  for (const Grid& g : db.grids())
-    lowest = std::min(lowest, g.info.lowest), highest = std::max(highest, g.info.highest);
-  return lowest + 0.3 * (highest - lowest);
+  const HeightRange heights = db.heights();
+  return heights.lowest + 0.3 * (heights.highest - heights.lowest);
 }
 
 std::vector<Case> cases(const Database& db) {

@@ -38,9 +38,7 @@ struct Path {
 
 class Flight {
  public:
-  Flight(const Database& db) : db_(db), extent_(db.extent()) {
-    for (const Grid& g : db.grids()) top_ = std::max(top_, g.info.highest);
-  }
+  Flight(const Database& db) : db_(db), extent_(db.extent()), top_(std::max(0.0, db.heights().highest)) {}
 
   Work fly(const Path& path) const {
     std::vector<double> bytes, whole;
@@ -119,7 +117,7 @@ class Flight {
 
   const Database& db_;
   Extent extent_;
-  double top_ = 0;
+  double top_;
 };
 
 // How much longer than asked an answer takes that is to keep to a time.

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "render/camera_path.h"
 #include "tools/bench/bench.h"
@@ -20,12 +19,10 @@ constexpr std::size_t kMeshVertices = std::size_t{2049} * 2049;  // a larger gri
 // Back and forth over the terrain, from a third of the extent's height up to a little over the summits.
 Flight flight_over(const Database& db, int frames) {
   const Extent e = db.extent();
-  double lowest = INFINITY, highest = -INFINITY;
-  for (const Grid& g : db.grids())
-    lowest = std::min(lowest, g.info.lowest), highest = std::max(highest, g.info.highest);
+  const HeightRange heights = db.heights();
   const auto at = [&](double x, double y, double z) {
     return Point3{e.xmin + x * (e.xmax - e.xmin), e.ymin + y * (e.ymax - e.ymin),
-                  lowest + z * (highest - lowest)};
+                  heights.lowest + z * (heights.highest - heights.lowest)};
   };
   Flight f;
   f.points = {at(0.2, 0.2, 1.3), at(0.4, 0.4, 1.05), at(0.7, 0.3, 1.15), at(0.8, 0.6, 1.1),

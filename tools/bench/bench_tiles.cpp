@@ -30,7 +30,7 @@ constexpr int kDoublings = 9;
 class Path {
  public:
   Path(const Database& db, std::string kind) : kind_(std::move(kind)), extent_(db.extent()) {
-    for (const Grid& g : db.grids()) top_ = std::max(top_, g.info.highest);
+    top_ = std::max(0.0, db.heights().highest);
     side_ = std::min(extent_.xmax - extent_.xmin, extent_.ymax - extent_.ymin);
   }
   Camera at(double way) const {

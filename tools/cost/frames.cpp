@@ -136,8 +136,7 @@ FrameScene frame_scene(const Database& db, const Extent& e, const std::string& f
   if (scene.camera || scene.path) return f;
   const double w = e.xmax - e.xmin, h = e.ymax - e.ymin;
   f.camera.eye = {e.xmin + 0.1 * w, e.ymin + 0.1 * h, 0};
-  f.camera.look = {e.xmin + 0.6 * w, e.ymin + 0.6 * h, -INFINITY};
-  for (const Grid& g : db.grids()) f.camera.look.z = std::max(f.camera.look.z, g.info.highest);
+  f.camera.look = {e.xmin + 0.6 * w, e.ymin + 0.6 * h, db.heights().highest};
   f.camera.eye.z = f.camera.look.z + 0.05 * std::min(w, h);
   return f;
 }

@@ -59,12 +59,7 @@ struct Setting {
 class Bench {
  public:
   Bench(const CostOptions& o, const Common& common)
-      : o_(o),
-        common_(common),
-        folder_({}),
-        db_(Database::open(o.database, common.memory)),
-        bar_(common, "cost") {
-    if (db_.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+      : o_(o), common_(common), folder_({}), db_(open_filled(o.database, common)), bar_(common, "cost") {
     extent_ = choose_extent();
     // The patches of every answer fit into the cache, so that reading them is apart from evaluating them.
     const std::size_t best = extract(db_, uniform(0)).patches.size();
@@ -156,8 +151,8 @@ class Bench {
 
   // From the error at which the answer begins to differ from the best one to that of the coarsest patch.
   void make_ladder() {
-    double low = 1e-6, high = 0;
-    for (const Grid& g : db_.grids()) high = std::max(high, g.patches[g.patches.size() - 1].bottom);
+    const double high = db_.coarsest_bottom();
+    double low = 1e-6;
     const std::vector<PatchId> best = extract(db_, uniform(0)).patches;
     double differs = std::max(high, 2 * low);
     while (differs > 1.01 * low) {

@@ -41,11 +41,9 @@ std::vector<BlendOptions> all_blends() {
 namespace {
 
 std::vector<double> ladder(const Database& db) {
-  double low = INFINITY, high = 0;
-  for (const Grid& g : db.grids()) {
-    low = std::min(low, g.info.accuracy + g.info.quantisation);
-    high = std::max(high, g.patches[g.patches.size() - 1].bottom);
-  }
+  const double high = db.coarsest_bottom();
+  double low = INFINITY;
+  for (const Grid& g : db.grids()) low = std::min(low, g.info.accuracy + g.info.quantisation);
   low = std::max(low, 1e-4 * high);
   std::vector<double> errors{0};
   for (int s = 0; s < 6; ++s) errors.push_back(low * std::pow(high / low, s / 5.0));

@@ -21,17 +21,15 @@ constexpr double kRounding = 1e-9;  // metres, and of the height
 // Somewhere over the terrain, looking somewhere.
 ViewCut any_view(Trial& t) {
   const Extent e = t.db.extent();
-  double lowest = INFINITY, highest = -INFINITY;
-  for (const Grid& g : t.db.grids())
-    lowest = std::min(lowest, g.info.lowest), highest = std::max(highest, g.info.highest);
+  const HeightRange heights = t.db.heights();
   const double side = std::min(e.xmax - e.xmin, e.ymax - e.ymin);
   const auto place = [&](double z) {
     const double x = t.between(e.xmin, e.xmax);
     return Point3{x, t.between(e.ymin, e.ymax), z};
   };
-  const Point3 eye = place(highest + t.between(0.001, 0.3) * side);
+  const Point3 eye = place(heights.highest + t.between(0.001, 0.3) * side);
   return over_terrain_of(t.db, {.eye = eye,
-                                .look = place(lowest),
+                                .look = place(heights.lowest),
                                 .fov_degrees = t.between(20, 80),
                                 .pixel_error = std::exp2(t.between(0, 6))});
 }

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <optional>
 
-#include "db/error.h"
 #include "tools/cli.h"
 #include "tools/output_file.h"
 #include "tools/resampler.h"
@@ -82,8 +81,7 @@ void print_text(const Accuracy& a, const Database& db) {
 }
 
 void run(const Options& o, const Common& common) {
-  const Database db = Database::open(o.database, common.memory);
-  if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  const Database db = open_filled(o.database, common);
   refuse_overwriting(o.database, {o.map});
   const Region region = o.region.region();
   const bool whole = o.region.extent.empty() && o.region.polygon.empty();

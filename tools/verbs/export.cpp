@@ -1,7 +1,6 @@
 // patchwork export: a grid's own samples back into a GeoTIFF.
 #include <fmt/format.h>
 
-#include "db/error.h"
 #include "db/stopwatch.h"
 #include "tools/cli.h"
 #include "tools/output_file.h"
@@ -15,17 +14,11 @@ struct Options {
   std::string database, name, file;
 };
 
-const Grid& grid_named(const Database& db, const std::string& name) {
-  for (const Grid& g : db.grids())
-    if (g.info.name == name) return g;
-  throw Error(db.path(), "it has no grid named " + name, "see: patchwork list DB");
-}
-
 void run(const Options& o, const Common& common) {
   const Stopwatch watch;
   const Database db = Database::open(o.database, common.memory);
   refuse_overwriting(o.database, {o.file});
-  const Grid& grid = grid_named(db, o.name);
+  const Grid& grid = db.grid(o.name);
   const double megasamples = double(grid.info.shape.width()) * grid.info.shape.height() / 1e6;
   ProgressBar bar(common, "export " + o.name, megasamples, "Msamples");
   const std::string type = write_samples(db, grid.info, o.file, [&](double share) { bar.show(share); });

@@ -109,8 +109,7 @@ Question question(const Database& db, const Options& o, const Common& common) {
               return make_surface(v);
             },
             o.pixel_error, 4096, "px"};
-  double most = 1;
-  for (const Grid& g : db.grids()) most = std::max(most, 2 * g.patches[g.patches.size() - 1].bottom);
+  const double most = std::max(1.0, 2 * db.coarsest_bottom());
   return {[u = UniformCut{0, o.region.region(), o.strict}](double error) mutable {
             u.error = error;
             return make_surface(u);

@@ -163,8 +163,7 @@ class Film {
 
 void run(const Options& o, const Common& common) {
   const Stopwatch watch;
-  Database db = Database::open(o.database, common.memory);
-  if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  Database db = open_filled(o.database, common);
   refuse_overwriting(o.database, {o.out, o.depth});
   Scene scene = o.scene.empty() ? default_scene() : read_scene(o.scene);
   if (!o.size.empty()) scene.width = o.size[0], scene.height = o.size[1];

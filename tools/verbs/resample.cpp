@@ -5,7 +5,6 @@
 #include <cmath>
 #include <optional>
 
-#include "db/error.h"
 #include "db/stopwatch.h"
 #include "render/hillshade.h"
 #include "render/patch_map.h"
@@ -118,8 +117,7 @@ Extent to_micrometres(const Extent& e) {
 
 void run(const Options& o, const Common& common) {
   const Stopwatch watch;
-  const Database db = Database::open(o.database, common.memory);
-  if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  const Database db = open_filled(o.database, common);
   refuse_overwriting(o.database, {o.out, o.hillshade, o.map});
   const Extent extent = o.region.extent.empty() ? to_micrometres(db.extent()) : o.region.region().bounds();
   const Raster raster = Raster::covering(extent, o.step > 0 ? o.step : finest_step(db, extent));

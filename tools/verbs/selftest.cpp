@@ -30,8 +30,7 @@ void print_table(const std::vector<Verdict>& all) {
 void run(const std::string& path, SelfTestOptions options, const Common& common) {
   GDALAllRegister();
   options.memory = common.memory;
-  const Database db = Database::open(path, common.memory);
-  if (db.grids().empty()) throw Error(path, "it holds no grid", "import one first");
+  const Database db = open_filled(path, common);
   ProgressBar bar(common, "selftest");
   const std::vector<Verdict> all = run_selftest(db, options, [&](double share) { bar.show(share); });
   int broken = 0;

@@ -27,8 +27,7 @@ std::string text_of(const std::string& path) {
 }
 
 void run(const Options& o, const Common& common) {
-  Database db = Database::open(o.database, common.memory);
-  if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  Database db = open_filled(o.database, common);
   refuse_overwriting(o.database, {o.screenshot});
   const std::string text = o.scene.empty() ? default_scene_text() : text_of(o.scene);
   Scene scene = parse_scene(text, o.scene);

@@ -81,8 +81,7 @@ void print_part(const char* name, const VolumePart& p) {
 void run(const Options& o, const Common& common) {
   if (o.before.empty() != o.plane.has_value())
     throw CLI::ValidationError("--before", "name surveys to compare with, or a --plane");
-  const Database db = Database::open(o.database, common.memory);
-  if (db.grids().empty()) throw Error(o.database, "it holds no grid", "import one first");
+  const Database db = open_filled(o.database, common);
   const Extent extent = extent_of(db, o);
   // Pixels as fine as what is compared, whatever else lies there.
   std::vector<GridId> compared = ids_of(db, o.after);

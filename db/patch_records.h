@@ -80,7 +80,6 @@ class PatchRecords {
   }
   /// What patch k offers; null where it offers nothing, or is not ragged and offers its kernel.
   const Offer* offer(std::size_t k) const;
-  /// REQUIRES: offers come in ascending order of their index.
   /// Calls visit(k, record) for all, in order, without keeping what is not in memory.
   template <class Visit>
   void each(Visit visit) const {

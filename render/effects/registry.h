@@ -1,5 +1,4 @@
-// The effects there are, each in a line: its name, when a scene calls for it, which tiles it can matter to,
-// what makes its stored results stale.
+// The effects there are, each in a line: its name, when a scene calls for it, which tiles it can matter to.
 #pragma once
 
 #include <bitset>
@@ -29,13 +28,9 @@ inline constexpr std::size_t kEffects = 13;
 using Set = std::bitset<kEffects>;
 inline bool has(const Set& s, Id id) { return s[std::size_t(id)]; }
 
-/// What stored results rest on. Without any, an effect stores nothing and costs only where it is drawn.
-enum Key : unsigned { kNothing = 0, kHeight = 1, kSun = 2 };
-
 struct Entry {
   Id id;
   const char* name;  ///< as in a scene
-  unsigned keys;     ///< of its stored results, Key bits
   /// Scene gate: named, and possible.
   bool (*called)(const Scene& scene, const SceneView& view);
   /// Tile gate: false only if it changes no pixel of the tile by more than kInvisible. REQUIRES: named.

@@ -18,7 +18,6 @@ class FrameEffects {
 
   /// What the pictures from now on call for.
   void change(const Scene& scene);
-  const Scene& scene() const { return scene_; }
   /// Heights changed there, metres: what rests on them is made anew.
   void heights_changed(std::span<const Extent> places) {
     map_.heights_changed(places), put_ramps(), changed_ = true;

@@ -19,7 +19,6 @@ class Target {
   VkRenderPass pass() const { return pass_.get(); }
   VkExtent2D size() const { return {color_.shape().width, color_.shape().height}; }
   const Texture& color() const { return color_; }
-  const Texture& depth() const { return depth_; }
   /// Clears both; afterwards the images can be copied from.
   void begin(VkCommandBuffer commands, const float (&background)[4]) const;
   void end(VkCommandBuffer commands) const { vkCmdEndRenderPass(commands); }

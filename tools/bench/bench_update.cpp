@@ -66,8 +66,6 @@ class Site {
         .seconds;
   }
 
-  double import_seconds() const { return import_seconds_; }
-  int size() const { return size_; }
   Json answer() const {
     return {{"size", size_},
             {"patches_added", report_["patches"]},

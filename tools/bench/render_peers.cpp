@@ -205,7 +205,6 @@ RenderPeers::RenderPeers(std::shared_ptr<Device> device, const Database& db, con
     : impl_(std::make_unique<Impl>(std::move(device), db, grid, width, height)) {}
 RenderPeers::~RenderPeers() = default;
 
-std::size_t RenderPeers::mesh_triangles() const { return impl_->mesh->triangles; }
 double RenderPeers::full_mesh(const Camera& camera) {
   impl_->mesh->place(camera);
   return impl_->measure(impl_->mesh_bindings, impl_->mesh_set, impl_->mesh_pipeline.get(),

@@ -15,7 +15,6 @@ class RenderPeers {
   ~RenderPeers();
 
   double full_mesh(const Camera& camera);
-  std::size_t mesh_triangles() const;
   /// The tiles that `renderer` drew last, each as 64 x 64 cells; as chunks are drawn, but for their skirts.
   double chunked(const Renderer& renderer);
   /// A full-screen triangle with the same shading; and so many plain triangles of those tiles, the same share

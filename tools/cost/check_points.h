@@ -16,10 +16,9 @@ class CheckPoints {
   std::size_t size() const { return x_.size(); }
   const std::vector<double>& x() const { return x_; }
   const std::vector<double>& y() const { return y_; }
-  const std::vector<double>& best() const { return best_; }
 
   /// Fills bound, error and beyond of `row`. `scale[k]`: metres to the row's unit, negative where the point
-  /// is not looked at; empty: metres everywhere. `slack(height)`: by how much an engine may differ, metres.
+  /// is not looked at; empty: metres everywhere. `float32`: the engine computes in it.
   void compare(const Evaluator& surface, std::span<const double> scale, bool float32, CostRow& row) const;
   /// The same for heights that come without bounds.
   ErrorFigures figures(std::span<const double> heights, std::span<const double> scale) const;

@@ -1,11 +1,11 @@
 #include "query/extract.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 
 #include "db/error.h"
+#include "db/stopwatch.h"
 #include "query/found.h"
 
 namespace patchwork {
@@ -19,7 +19,7 @@ constexpr int kBudgetSteps = 24;  // halvings of those 20 octaves: the error is 
 }  // namespace
 
 Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   thread_local std::vector<FoundPatch> found;  // its memory serves the next answer
   found.clear();
   double largest_asked = 0;
@@ -47,8 +47,8 @@ Extraction extract(const Database& db, const CutSurface& cut, bool strict) {
   Extraction result = in_order(found);
   if (found.capacity() > kKept) std::vector<FoundPatch>().swap(found);
   if (strict) result.bound_max = std::min(result.bound_max, largest_asked);
-  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  result.cost.nodes = visited.nodes, result.cost.boxes = visited.boxes, result.cost.seconds = seconds.count();
+  result.cost.nodes = visited.nodes, result.cost.boxes = visited.boxes;
+  result.cost.seconds = watch.seconds();
   return result;
 }
 

@@ -1,11 +1,10 @@
-#include <chrono>
-
+#include "db/stopwatch.h"
 #include "query/found.h"
 
 namespace patchwork {
 
 Extraction extract_grids(const Database& db, std::span<const GridId> grids, const Region& region) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const Database::Reading reading = db.reading();
   std::vector<FoundPatch> found;
   for (const GridId id : grids) {
@@ -21,8 +20,7 @@ Extraction extract_grids(const Database& db, std::span<const GridId> grids, cons
     }
   }
   Extraction result = in_order(found);
-  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  result.cost.seconds = seconds.count();
+  result.cost.seconds = watch.seconds();
   return result;
 }
 

@@ -130,12 +130,7 @@ bool Region::meets(const Grid& grid, const GridShape::Block& b) const {
   if (!rotated || (e.contains({around.xmin, around.ymin}) && e.contains({around.xmax, around.ymax})))
     return true;
   // Two convex sets are apart if a side of one of them parts them: here a patch's.
-  LatticeRect seen{INFINITY, INFINITY, -INFINITY, -INFINITY};
-  for (const double x : {e.xmin, e.xmax})
-    for (const double y : {e.ymin, e.ymax}) {
-      const Point p = f.to_lattice(x, y);
-      seen = {std::min(seen.i0, p.x), std::min(seen.j0, p.y), std::max(seen.i1, p.x), std::max(seen.j1, p.y)};
-    }
+  const LatticeRect seen = f.lattice_bounds(e.corners());
   return seen.i0 <= domain.i1 && domain.i0 <= seen.i1 && seen.j0 <= domain.j1 && domain.j0 <= seen.j1;
 }
 

@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
 #include "db/error.h"
 #include "db/raster.h"
+#include "db/stopwatch.h"
 #include "tools/bench/bench.h"
 #include "tools/bench/pyramid_coder.h"
 
@@ -74,16 +74,13 @@ class CodecBench {
   }
 
   void measure(Coder& coder, int tolerance, bool keep) const {
-    using Clock = std::chrono::steady_clock;
-    const auto speed = [&](Clock::time_point start) {
-      return samples() / std::chrono::duration<double, std::micro>(Clock::now() - start).count();
-    };
-    const Clock::time_point encoding = Clock::now();
+    const auto speed = [&](const Stopwatch& watch) { return samples() / (1e6 * watch.seconds()); };
+    const Stopwatch encoding;
     coder.encode(pyramid_, tolerance);
     const double encoded = speed(encoding);
     Pyramid out = pyramid_;
     for (Level& l : out) std::fill(l.samples.begin(), l.samples.end(), 0);
-    const Clock::time_point decoding = Clock::now();
+    const Stopwatch decoding;
     coder.decode(out);
     const double decoded = speed(decoding);
     if (keep) coder.encoded.push_back(encoded), coder.decoded.push_back(decoded);

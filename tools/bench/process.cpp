@@ -6,10 +6,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <chrono>
 #include <system_error>
 
 #include "db/error.h"
+#include "db/stopwatch.h"
 
 namespace patchwork::cli {
 
@@ -49,7 +49,7 @@ ProcessUse run_process(const std::vector<std::string>& arguments, const std::str
   for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
   argv.push_back(nullptr);
   Pipe out;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const pid_t child = fork();
   if (child < 0) throw std::system_error(errno, std::generic_category(), "fork");
   if (child == 0) {
@@ -64,7 +64,7 @@ ProcessUse run_process(const std::vector<std::string>& arguments, const std::str
   rusage resources{};
   while (wait4(child, &status, 0, &resources) < 0)
     if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "wait4");
-  use.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  use.seconds = watch.seconds();
   use.peak_mib = double(resources.ru_maxrss) / 1024;  // Linux counts KiB
   if (WIFEXITED(status) && WEXITSTATUS(status) == kNotThere)
     throw Error(arguments.front(), "the program is not there",

@@ -21,7 +21,7 @@ struct Area {
   }
 };
 
-/// Rows that are evaluated together.
+/// A row of the area, evaluated.
 struct AreaRow {
   int row = 0;
   std::span<const double> height, bound;              ///< metres; NaN where there is no data

@@ -37,6 +37,7 @@ struct GridInfo {
   double raw_scale = 1;               ///< metres per raw unit
   std::optional<double> nodata = {};  ///< the raw value that meant no data, where one was declared
   double height(double code) const { return quantum * (double(code_origin) + code) + base; }
+  /// Of the footprint, rounding allowed for.
   Extent bounds() const { return frame.bounds(shape.footprint()); }
 };
 

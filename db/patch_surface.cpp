@@ -18,8 +18,8 @@ constexpr int kSplineReach = 3;
 // cell at least.
 int part_a_cell(int level, int feather) { return kFeatherCells / std::max(1, feather >> std::min(level, 8)); }
 
-// A number of every cell of a window and of what can fade it. A cell more stands around, which nothing
-// changes; rows are as long as vectors like.
+// A number for each cell of a window and of what can fade it. One more cell stands around these, which
+// nothing changes; rows are as long as vectors like them.
 class Plane {
  public:
   static constexpr int kMargin = kFeatherCells + kSplineReach, kSpan = kSide + 2 * kMargin, kRow = 64;

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "db/raster_impl.h"
-#include "db/threads.h"
 
 namespace patchwork::raster_impl {
 
@@ -59,7 +58,6 @@ GDALDatasetUniquePtr open_dataset(const std::string& path) {
   const GdalMessages messages;
   // Rows of uncompressed TIFFs go past GDAL's block cache: 4097 x 4097 of 16 bits in 28 ms instead of 62.
   const CPLConfigOptionSetter direct("GTIFF_DIRECT_IO", "YES", true);
-  const CPLConfigOptionSetter threads("GDAL_NUM_THREADS", std::to_string(allowed_threads()).c_str(), true);
   GDALDatasetUniquePtr dataset(
       GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR));
   if (dataset) return dataset;

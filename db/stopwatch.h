@@ -6,7 +6,7 @@
 
 namespace patchwork {
 
-/// How long something takes: runs from when it is made.
+/// Runs from when it is made.
 class Stopwatch {
  public:
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }

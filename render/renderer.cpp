@@ -237,6 +237,8 @@ Image Renderer::picture() const {
   return image;
 }
 
+ValueScale Renderer::overlay_scale() const { return impl_->effects.scale(); }
+void Renderer::keep_scale() { impl_->effects.keep_scale(); }
 void Renderer::draw_legend(Image& picture) const { impl_->effects.draw_legend(picture); }
 
 void Renderer::change(const SceneEffects& to) {

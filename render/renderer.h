@@ -113,6 +113,10 @@ class Renderer {
   std::vector<MeshVertex> mesh() const;
   /// From the next frame on: another size of the picture (pixels, at least 1 x 1), another error. Tiles stay.
   void reshape(int width, int height, double pixel_error);
+  /// Of the error or cost overlay, as drawn last. Kept, it holds for all pictures until the effects or the
+  /// size change: what is compared shares one scale.
+  ValueScale overlay_scale() const;
+  void keep_scale();
   /// Onto a picture of any size: what picture() has of a legend.
   void draw_legend(Image& picture) const;
   const TileCache& cache() const;

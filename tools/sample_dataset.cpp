@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "db/error.h"
-#include "db/threads.h"
 #include "tools/output_file.h"
+#include "tools/threads.h"
 
 namespace patchwork {
 
 namespace {
 
-constexpr int kRows = 2 * kChunkVertices;
+constexpr int kRows = 2 * kChunkVertices;  // a row of the file's tiles, so that each is written once
 
 struct Range {
   double low = INFINITY, high = -INFINITY;
@@ -89,6 +89,7 @@ class SampleWriter {
   void fill(const std::string& path, const std::string& name) {
     CPLStringList options;
     options.SetNameValue("TILED", "YES").SetNameValue("COMPRESS", "DEFLATE");
+    options.SetNameValue("BLOCKYSIZE", std::to_string(kRows).c_str());
     options.SetNameValue("PREDICTOR", GDALDataTypeIsInteger(type_) ? "2" : "3");
     options.SetNameValue("BIGTIFF", "IF_SAFER");
     options.SetNameValue("NUM_THREADS", std::to_string(allowed_threads()).c_str());

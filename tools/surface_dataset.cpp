@@ -11,8 +11,8 @@
 #include <memory>
 
 #include "db/error.h"
-#include "db/threads.h"
 #include "tools/output_file.h"
+#include "tools/threads.h"
 
 // The surface is shown to GDAL as a dataset with overviews whose pixels are made when they are read; its COG
 // driver copies that dataset level by level, coarsest first, in the order of the file. Nothing is computed

@@ -5,8 +5,10 @@
 namespace patchwork::effects {
 
 void describe(Fields<ErrorOverlay>& f) {
-  f.number("lowest", &ErrorOverlay::lowest, above(0), "bound of the first colour, metres; without: in view");
-  f.number("highest", &ErrorOverlay::highest, above(0), "bound of the last colour, metres; without: in view");
+  f.number("lowest", &ErrorOverlay::lowest, above(0),
+           "bound of the first colour, metres; without: in view, of a film in its first picture");
+  f.number("highest", &ErrorOverlay::highest, above(0),
+           "bound of the last colour, metres; without: in view, of a film in its first picture");
   f.flag("logarithmic", &ErrorOverlay::logarithmic,
          "a logarithmic scale; without: where the skewness of the bounds is above 1");
   f.number("opacity", &ErrorOverlay::opacity, between(0, 1), "over the ground's own colour");

@@ -14,7 +14,7 @@ namespace effects {
 
 /// The bound that the blend gives, metres.
 struct ErrorOverlay {
-  std::optional<double> lowest, highest;  ///< metres; without: of what is in view
+  std::optional<double> lowest, highest;  ///< metres; without: of what is in view (see Renderer::keep_scale)
   bool logarithmic = false;               ///< else where the bounds' skewness is above 1
   double opacity = 1;
 };

@@ -28,7 +28,7 @@ FrameEffects::FrameEffects(const Device::Impl& device, const Database& db, const
 }
 
 void FrameEffects::change(const Scene& scene) {
-  scene_ = scene, changed_ = true;
+  scene_ = scene, changed_ = true, kept_.reset();
   put_ramps();
 }
 
@@ -71,7 +71,7 @@ bool FrameEffects::prepare(effects::SceneView view, std::span<const float> bound
   on_ = effects::called_for(scene_, view);
   const auto tints = scene_.effects.tints.value_or(effects::Tints{});
   tints_ = {tints.lowest.value_or(view.lowest), tints.highest.value_or(view.highest), false};
-  scale_ = overlay_of(bounds);
+  scale_ = kept_ ? *kept_ : overlay_of(bounds);
   effects::Look look = effects::look_of(scene_, {view, tints_, scale_});
   if (map_.has_heights()) {
     const effects::Relief& r = map_.relief();

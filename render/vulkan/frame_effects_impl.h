@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,6 +36,10 @@ class FrameEffects {
   const effects::Set& on() const { return on_; }
   /// Metres that the ground sinks a square metre of distance.
   double curvature(const effects::SceneView& view) const;
+  /// Of the error or cost overlay in the last picture; kept, it is that of all pictures until the next
+  /// change.
+  const ValueScale& scale() const { return scale_; }
+  void keep_scale() { kept_ = scale_; }
   /// What the picture's colours stand for, where the scene wants it.
   void draw_legend(Image& picture) const;
   std::size_t bytes_set() const { return bytes_set_; }  ///< by the last prepare
@@ -77,6 +82,7 @@ class FrameEffects {
   LightMap map_;
   effects::Set on_;
   ValueScale tints_, scale_;
+  std::optional<ValueScale> kept_;
   std::array<float, effects::kLookFloats> block_{};
   Buffer look_, ramps_;
   OwnedView ramp_texels_;

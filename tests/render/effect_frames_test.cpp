@@ -388,5 +388,28 @@ TEST_F(CountersTest, TheLegendIsDrawnWhereThereIsAScale) {
   EXPECT_GT(distance(a.at(kWidth - 16, kHeight - 16), b.at(kWidth - 16, kHeight - 16)), 4);
 }
 
+// A film whose colours meant another bound in each picture could not be read.
+TEST_F(CountersTest, AScaleThatIsKeptIsThatOfAllPictures) {
+  const Database db = folder_.database();
+  SceneEffects e = lit(120, 30);
+  e.error = effects::ErrorOverlay{};
+  Renderer r = renderer_of(db, e, 8);
+  Camera far = kCamera;
+  far.eye.z = 6000;
+  r.draw(far);
+  const ValueScale other = r.overlay_scale();
+  r.draw(kCamera);
+  const ValueScale first = r.overlay_scale();
+  ASSERT_TRUE(first.lowest != other.lowest || first.highest != other.highest) << "the control";
+  r.keep_scale();
+  r.draw(far);
+  EXPECT_EQ(r.overlay_scale().lowest, first.lowest);
+  EXPECT_EQ(r.overlay_scale().highest, first.highest);
+  EXPECT_EQ(r.overlay_scale().logarithmic, first.logarithmic);
+  r.change(e);
+  r.draw(far);
+  EXPECT_EQ(r.overlay_scale().highest, other.highest);
+}
+
 }  // namespace
 }  // namespace patchwork

@@ -29,13 +29,15 @@ GDALDatasetUniquePtr create(const std::string& path, int width, int height) {
   return file;
 }
 
-// `threads`: to start them takes longer than to read a level of a few blocks.
+// As one would who knows the file: no other driver is asked, and the folder is not searched. `threads`: to
+// start them takes longer than to read a level of a few blocks.
 GDALDatasetUniquePtr open_level(const std::string& path, int level, bool threads) {
   const std::string only = level > 0 ? std::to_string(level - 1) + " only" : "NONE",
                     overview = "OVERVIEW_LEVEL=" + only;
   const char* const options[] = {threads ? "NUM_THREADS=ALL_CPUS" : "NUM_THREADS=1", overview.c_str(),
                                  nullptr};
-  GDALDatasetUniquePtr file(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER, nullptr, options, nullptr));
+  const char *const drivers[] = {"GTiff", nullptr}, *const beside_it[] = {nullptr};
+  GDALDatasetUniquePtr file(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER, drivers, options, beside_it));
   if (!file) throw Error(path, "GDAL cannot open the uniform grid");
   return file;
 }

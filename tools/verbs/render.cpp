@@ -127,6 +127,7 @@ class Film {
     const FrameStats s = renderer_.draw(view);
     const int k = total.frames;
     total.add(s);
+    if (number && k == 0) renderer_.keep_scale();
     if (o_.stats) per_frame.push_back(facts(s));
     const Stopwatch writing;
     const auto name = [&](const std::string& path) { return number ? numbered(path, k) : path; };

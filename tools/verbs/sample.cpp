@@ -1,5 +1,6 @@
 // patchwork sample: points in, heights and their bounds out, any number, as a stream.
 #include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cctype>
@@ -16,17 +17,25 @@ namespace patchwork::cli {
 namespace {
 
 constexpr std::size_t kBatch = 1 << 18;  // points evaluated together
+constexpr std::size_t kPiece = 4096;     // lines written by one thread
 
 struct Options {
   std::string database;
   SurfaceOptions surface;
 };
 
-constexpr std::string_view kBlanks = " \r";
+bool is_blank(char c) { return c == ' ' || c == '\r'; }
+// Of what parts fields, the one of the highest rank in a line; 0: parts nothing.
+int rank_of(char c) { return c == '\t' ? 3 : c == ';' ? 2 : c == ',' ? 1 : 0; }
 
+std::string_view without_leading_blanks(std::string_view text) {
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  return text;
+}
 std::string_view trimmed(std::string_view text) {
-  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
-  return text.substr(0, text.find_last_not_of(kBlanks) + 1);
+  text = without_leading_blanks(text);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
 }
 
 // The fields of a line, one after the other: between tabs, else between semicolons, else between commas,
@@ -34,28 +43,24 @@ std::string_view trimmed(std::string_view text) {
 class Fields {
  public:
   explicit Fields(std::string_view line) : left_(trimmed(line)), more_(!left_.empty()) {
-    // The one that counts most of those outside of quotes, which begin with a field.
-    constexpr std::string_view kSeparators = ",;\t";
-    std::size_t best = 0;
-    bool begins = true;
+    int best = 0;
+    bool begins = true;  // a field, and with it perhaps a quote
     for (std::size_t at = 0; at < left_.size(); ++at) {
       if (begins && left_[at] == '"') at = std::min(closing_quote(at), left_.size() - 1);
-      const std::size_t rank = kSeparators.find(left_[at]);
-      if (rank != std::string_view::npos && rank + 1 > best) best = rank + 1, separator_ = left_[at];
-      begins =
-          rank != std::string_view::npos || (begins && kBlanks.find(left_[at]) != std::string_view::npos);
+      const int rank = rank_of(left_[at]);
+      if (rank > best) best = rank, separator_ = left_[at];
+      begins = rank > 0 || (begins && is_blank(left_[at]));
     }
   }
 
   bool more() const { return more_; }
   std::string_view next() {
-    const std::size_t from = behind_quotes();
-    const std::size_t to = separator_ ? left_.find(separator_, std::min(from, left_.size()))
-                                      : left_.find_first_of(kBlanks, std::min(from, left_.size()));
+    std::size_t to = std::min(behind_quotes(), left_.size());
+    while (to < left_.size() && !(separator_ ? left_[to] == separator_ : is_blank(left_[to]))) ++to;
     std::string_view field = trimmed(left_.substr(0, to));
-    more_ = to != std::string_view::npos;
+    more_ = to < left_.size();
     left_.remove_prefix(more_ ? to + 1 : left_.size());
-    left_.remove_prefix(std::min(left_.find_first_not_of(kBlanks), left_.size()));
+    left_ = without_leading_blanks(left_);
     if (field.size() > 1 && field.front() == '"' && field.back() == '"')
       field = field.substr(1, field.size() - 2);
     return field;
@@ -156,19 +161,25 @@ class Sampler {
     height_.resize(x_.size()), bound_.resize(x_.size()), source_.resize(x_.size());
     counts_ +=
         blend_->at_points(x_, y_, {.height = height_, .bound = bound_, .source = source_, .patch = {}});
-    fmt::memory_buffer out;
-    for (std::size_t k = 0; k < x_.size(); ++k) {
-      if (source_[k] == 0) {
-        fmt::format_to(std::back_inserter(out), "{} {} nan nan -\n", x_[k], y_[k]);
-        continue;
-      }
-      const std::string& name = db_.grids()[size_t(std::abs(source_[k])) - 1].info.name;
-      fmt::format_to(std::back_inserter(out), "{} {} {} {} {}{}\n", x_[k], y_[k], height_[k], bound_[k], name,
-                     source_[k] < 0 ? "(filled)" : "");
-    }
-    if (std::fwrite(out.data(), 1, out.size(), stdout) != out.size() || std::fflush(stdout) != 0)
+    std::vector<fmt::memory_buffer> pieces((x_.size() + kPiece - 1) / kPiece);
+    tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t n) {
+      for (std::size_t k = n * kPiece; k < std::min(x_.size(), (n + 1) * kPiece); ++k) write(k, pieces[n]);
+    });
+    bool good = true;
+    for (const fmt::memory_buffer& out : pieces)
+      good = good && std::fwrite(out.data(), 1, out.size(), stdout) == out.size();
+    if (!good || std::fflush(stdout) != 0)
       throw Error("standard output", "it cannot be written", "is the disk full?");
     x_.clear(), y_.clear();
+  }
+  void write(std::size_t k, fmt::memory_buffer& out) const {
+    if (source_[k] == 0) {
+      fmt::format_to(std::back_inserter(out), "{} {} nan nan -\n", x_[k], y_[k]);
+      return;
+    }
+    const std::string& name = db_.grids()[size_t(std::abs(source_[k])) - 1].info.name;
+    fmt::format_to(std::back_inserter(out), "{} {} {} {} {}{}\n", x_[k], y_[k], height_[k], bound_[k], name,
+                   source_[k] < 0 ? "(filled)" : "");
   }
 
   const Database& db_;

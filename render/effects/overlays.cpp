@@ -6,9 +6,9 @@ namespace patchwork::effects {
 
 void describe(Fields<ErrorOverlay>& f) {
   f.number("lowest", &ErrorOverlay::lowest, above(0),
-           "bound of the first colour, metres; without: in view, of a film in its first picture");
+           "bound of the first colour, metres; without: in view, of a film in its first picture of ground");
   f.number("highest", &ErrorOverlay::highest, above(0),
-           "bound of the last colour, metres; without: in view, of a film in its first picture");
+           "bound of the last colour, metres; without: in view, of a film in its first picture of ground");
   f.flag("logarithmic", &ErrorOverlay::logarithmic,
          "a logarithmic scale; without: where the skewness of the bounds is above 1");
   f.number("opacity", &ErrorOverlay::opacity, between(0, 1), "over the ground's own colour");

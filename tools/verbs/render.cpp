@@ -127,7 +127,7 @@ class Film {
     const FrameStats s = renderer_.draw(view);
     const int k = total.frames;
     total.add(s);
-    if (number && k == 0) renderer_.keep_scale();
+    if (number && !scaled_ && s.tiles_drawn > 0) renderer_.keep_scale(), scaled_ = true;
     if (o_.stats) per_frame.push_back(facts(s));
     const Stopwatch writing;
     const auto name = [&](const std::string& path) { return number ? numbered(path, k) : path; };
@@ -160,6 +160,7 @@ class Film {
   const Scene& scene_;
   std::shared_ptr<Device> device_;
   Renderer renderer_;
+  bool scaled_ = false;  // a picture of ground has given the overlay's scale
 };
 
 void run(const Options& o, const Common& common) {

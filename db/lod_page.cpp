@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "db/little_endian.h"
 #include "db/vectorized.h"
 
 // A page as bytes, format 1, all little-endian:
@@ -158,31 +159,16 @@ PATCHWORK_VECTORIZED void keep_inside(const LodPage& p, const Extent& region, st
                           (p.ymax[s] <= region.ymax) & (region.ymin <= p.ymin[s]));
 }
 
-template <class T>
-void put(std::vector<std::byte>& out, T value) {
-  for (std::size_t i = 0; i < sizeof(T); ++i) out.push_back(std::byte(value >> 8 * i));
-}
-
-template <class T>
-T get(const std::byte*& from) {
-  T value = 0;
-  for (std::size_t i = 0; i < sizeof(T); ++i) value = T(value | T(*from++) << 8 * i);
-  return value;
-}
-
 void put_entry(std::vector<std::byte>& out, const LodEntry& e) {
-  for (const double side : {e.box.xmin, e.box.ymin, e.box.xmax, e.box.ymax})
-    put(out, std::bit_cast<std::uint64_t>(side));
-  for (const float side : {e.box.bottom, e.box.top}) put(out, std::bit_cast<std::uint32_t>(side));
-  put(out, e.id.value);
+  for (const double side : {e.box.xmin, e.box.ymin, e.box.xmax, e.box.ymax}) put_little(out, side);
+  for (const float side : {e.box.bottom, e.box.top}) put_little(out, side);
+  put_little(out, e.id.value);
 }
 
-LodEntry get_entry(const std::byte*& from) {
-  double sides[4];
-  for (double& side : sides) side = std::bit_cast<double>(get<std::uint64_t>(from));
-  const auto bottom = std::bit_cast<float>(get<std::uint32_t>(from));
-  const auto top = std::bit_cast<float>(get<std::uint32_t>(from));
-  return {{sides[0], sides[1], sides[2], sides[3], bottom, top}, {get<std::uint64_t>(from)}};
+LodEntry get_entry(const std::byte* from) {
+  const auto side = [&](std::size_t k) { return get_little<double>(from + 8 * k); };
+  return {{side(0), side(1), side(2), side(3), get_little<float>(from + 32), get_little<float>(from + 36)},
+          {get_little<std::uint64_t>(from + 40)}};
 }
 
 }  // namespace
@@ -212,8 +198,13 @@ LodPage::LodPage(std::uint32_t page_level) {
 }
 
 void LodPage::set_box(std::uint32_t s, const LodBox& b) {
-  xmin[s] = b.xmin, ymin[s] = b.ymin, xmax[s] = b.xmax, ymax[s] = b.ymax, bottom[s] = b.bottom,
-  top[s] = b.top;
+  xmin[s] = b.xmin, ymin[s] = b.ymin, xmax[s] = b.xmax, ymax[s] = b.ymax;
+  bottom[s] = b.bottom, top[s] = b.top;
+  if (count == 0) origin = {b.xmin, b.ymin};
+  const double w = b.xmin - origin.x, so = b.ymin - origin.y, e = b.xmax - origin.x, n = b.ymax - origin.y;
+  west[s] = float_at_most(w), south[s] = float_at_most(so);
+  east[s] = float_at_least(e), north[s] = float_at_least(n);
+  reach = std::max({reach, std::abs(w), std::abs(so), std::abs(e), std::abs(n)});
 }
 
 void LodPage::append(const LodEntry& e) {
@@ -247,10 +238,7 @@ LodHits LodPage::uniform_hits(const Extent& region, float error, bool in) const 
   return hits;
 }
 
-std::uint64_t LodPage::mask_of_used(const std::uint8_t (&hit)[kSlots]) const {
-  const std::uint64_t mask = mask_of(hit);
-  return count == kSlots ? mask : mask & ((std::uint64_t{1} << count) - 1);
-}
+std::uint64_t LodPage::mask_of_used(const std::uint8_t (&hit)[kSlots]) const { return mask_of(hit) & used(); }
 
 std::uint32_t LodPage::choose_slot(const LodBox& b) const {
   double growth[kSlots], size[kSlots];
@@ -285,7 +273,7 @@ LodPage LodPage::split(const LodEntry& extra) {
 std::vector<std::byte> LodPage::bytes() const {
   std::vector<std::byte> out;
   out.reserve(kPageHeader + count * kEntryBytes);
-  put(out, kFormat), put(out, std::uint8_t(level)), put(out, std::uint16_t(count));
+  put_little(out, kFormat), put_little(out, std::uint8_t(level)), put_little(out, std::uint16_t(count));
   for (std::uint32_t s = 0; s < count; ++s) put_entry(out, entry(s));
   return out;
 }
@@ -293,14 +281,13 @@ std::vector<std::byte> LodPage::bytes() const {
 LodPage LodPage::from_bytes(std::span<const std::byte> bytes, std::string& problem) {
   LodPage page;
   if (bytes.size() < kPageHeader) return problem = "is cut short", page;
-  const std::byte* from = bytes.data();
-  if (get<std::uint8_t>(from) != kFormat) return problem = "has an unknown format", page;
-  page.level = get<std::uint8_t>(from);
-  const std::uint32_t count = get<std::uint16_t>(from);
+  if (std::uint8_t(bytes[0]) != kFormat) return problem = "has an unknown format", page;
+  page.level = std::uint8_t(bytes[1]);
+  const std::uint32_t count = get_little<std::uint16_t>(bytes.data() + 2);
   if (count > kSlots || bytes.size() != kPageHeader + count * kEntryBytes)
     return problem = "has a wrong number of entries", page;
   for (std::uint32_t s = 0; s < count; ++s) {
-    page.append(get_entry(from));
+    page.append(get_entry(bytes.data() + kPageHeader + s * kEntryBytes));
     if (!page.box(s).sound()) return problem = "holds a box that is none", page;
   }
   return page;

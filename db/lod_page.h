@@ -45,14 +45,21 @@ struct LodHits {
 
 /// Slots [0, count) are in use. In a leaf (level 0) an entry's id is a patch, elsewhere the index of a page.
 struct LodPage {
+  static constexpr std::size_t kLine = 64;        ///< bytes that memory gives at once
   static constexpr std::uint32_t kSlots = 64;     ///< a visit keeps its hits in one 64-bit mask
   static constexpr std::uint32_t kMinSlots = 24;  ///< of every page but the root
   static constexpr std::uint32_t kFree = 0xffff;  ///< the level of a page that is not in use
 
-  double xmin[kSlots], ymin[kSlots], xmax[kSlots], ymax[kSlots];
-  float bottom[kSlots], top[kSlots];
-  std::uint64_t ref[kSlots];
   std::uint32_t level = kFree, count = 0;
+  /// A place near the boxes, from which floats give their sides in half the bytes: metres, rounded outward
+  /// but for what the subtraction loses, 2^-53 of it. None is further away, along x or y, than `reach`.
+  Point origin{};
+  double reach = 0;
+  alignas(kLine) float bottom[kSlots];
+  float top[kSlots];
+  std::uint64_t ref[kSlots];
+  float west[kSlots], south[kSlots], east[kSlots], north[kSlots];
+  double xmin[kSlots], ymin[kSlots], xmax[kSlots], ymax[kSlots];
 
   explicit LodPage(std::uint32_t page_level = kFree);
   LodBox box(std::uint32_t s) const { return {xmin[s], ymin[s], xmax[s], ymax[s], bottom[s], top[s]}; }
@@ -63,12 +70,13 @@ struct LodPage {
   void remove(std::uint32_t s);    ///< the last entry takes its place
   LodBox bounds() const;           ///< REQUIRES: count > 0
 
-  /// Asks memory for what every cut reads of a page: errors and refs, which lie side by side.
+  /// Asks memory for what every cut reads of a page, which lies at its beginning.
   void prefetch() const {
-    constexpr std::size_t kLine = 64, kBytes = sizeof(bottom) + sizeof(top) + sizeof(ref);
-    for (std::size_t at = 0; at < kBytes; at += kLine)
-      __builtin_prefetch(reinterpret_cast<const char*>(bottom) + at);
+    for (std::size_t at = 0; at < offsetof(LodPage, west); at += kLine)
+      __builtin_prefetch(reinterpret_cast<const char*>(this) + at);
   }
+  /// Bit s is set for the slots in use.
+  std::uint64_t used() const { return count == kSlots ? ~std::uint64_t{0} : (std::uint64_t{1} << count) - 1; }
   /// Bit s is hit[s] (0 or 1) of the slots in use.
   std::uint64_t mask_of_used(const std::uint8_t (&hit)[kSlots]) const;
   /// The boxes that meet the closed region with bottom <= error < top; `in`: all are inside the region.

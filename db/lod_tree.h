@@ -129,18 +129,18 @@ class LodTree {
 
 template <class Hits, class Emit>
 VisitCost LodTree::walk(Hits hits, Emit& emit) const {
-  struct Level {
-    const LodPage* page;
-    LodHits left;
-  } stack[kMaxHeight];
+  // The way down: pages, and what of their hits is left. Apart, because what a call returned in two registers
+  // and is stored side by side makes GCC 12 wait for memory.
+  const LodPage* way[kMaxHeight];
+  std::uint64_t met[kMaxHeight], inside[kMaxHeight];
   VisitCost cost;
   std::uint32_t depth = 0;
-  const auto enter = [&](const LodPage& page, bool inside) {
+  const auto enter = [&](const LodPage& page, bool all_inside) {
     ++cost.nodes, cost.boxes += page.count;
-    const LodHits found = hits(page, inside);
+    const LodHits found = hits(page, all_inside);
     if (page.level > 0) {
       if (depth == kMaxHeight) refuse("its pages form a ring");
-      stack[depth++] = {&page, found};
+      way[depth] = &page, met[depth] = found.met, inside[depth] = found.inside, ++depth;
     } else {
       for (std::uint64_t left = found.met; left; left &= left - 1)
         emit(page.entry(std::uint32_t(std::countr_zero(left))));
@@ -148,17 +148,17 @@ VisitCost LodTree::walk(Hits hits, Emit& emit) const {
   };
   enter(pages_[root_], false);
   while (depth > 0) {
-    Level& top = stack[depth - 1];
-    if (top.left.met == 0) {
+    const std::uint32_t top = depth - 1;
+    if (met[top] == 0) {
       --depth;
       continue;
     }
-    const auto slot = std::uint32_t(std::countr_zero(top.left.met));
-    top.left.met &= top.left.met - 1;
-    if (top.left.met != 0)
-      if (const LodPage* next = pages_.find(top.page->child(std::uint32_t(std::countr_zero(top.left.met)))))
+    const auto slot = std::uint32_t(std::countr_zero(met[top]));
+    met[top] &= met[top] - 1;
+    if (met[top] != 0)
+      if (const LodPage* next = pages_.find(way[top]->child(std::uint32_t(std::countr_zero(met[top])))))
         next->prefetch();
-    enter(pages_[top.page->child(slot)], top.left.inside >> slot & 1);
+    enter(pages_[way[top]->child(slot)], inside[top] >> slot & 1);
   }
   return cost;
 }

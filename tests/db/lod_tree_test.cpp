@@ -220,6 +220,46 @@ TEST(LodTree, HitsAreClosedInPlaceAndHalfOpenInError) {
   EXPECT_EQ(hits(kEverywhere, std::numeric_limits<double>::quiet_NaN()), 0u);
 }
 
+// What views compare instead of a page's sides: never inside them, and close to them.
+TEST(LodPage, FloatsFromTheOriginHoldTheBoxes) {
+  std::mt19937_64 random(seed());
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  double furthest = 0;
+  for (const double away : {0.0, 4.2e6, -1e12}) {
+    LodPage page(0);
+    const auto box = [&] {
+      const double x = away + uniform(-500, 500), y = 2 * away + uniform(-500, 500);
+      return LodBox{x, y, x + uniform(0, 90), y + uniform(0, 90), 1, 2};
+    };
+    for (int n = 0; n < 2000; ++n) {
+      const std::uint32_t slot = page.count ? std::uint32_t(random() % page.count) : 0;
+      if (page.count == 0 || (page.count < LodPage::kSlots && n % 3 == 0))
+        page.append({box(), {std::uint64_t(n)}});
+      else if (n % 3 == 1)
+        page.set_box(slot, box());
+      else if (n % 50 == 2)
+        page.remove(slot);
+      for (std::uint32_t s = 0; s < page.count; ++s) {
+        const LodBox b = page.box(s);
+        const double lost = page.reach * 0x1p-53;
+        const double out[] = {b.xmin - page.origin.x - double(page.west[s]),
+                              b.ymin - page.origin.y - double(page.south[s]),
+                              double(page.east[s]) - (b.xmax - page.origin.x),
+                              double(page.north[s]) - (b.ymax - page.origin.y)};
+        for (const double o : out) {
+          ASSERT_GE(o, -lost);
+          furthest = std::max(furthest, o / page.reach);
+        }
+        ASSERT_LE(std::max(std::abs(b.xmin - page.origin.x), std::abs(b.ymax - page.origin.y)), page.reach);
+      }
+    }
+  }
+  EXPECT_LT(furthest, 0x1p-23);
+  EXPECT_GT(furthest, 0) << "negative control: floats do lose something";
+}
+
 TEST(LodTree, ErasesOnlyWhatIsEqual) {
   Boxes boxes(seed());
   const std::vector<Entry> all = boxes.take(300);

@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <hwy/targets.h>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <numbers>
 #include <random>
@@ -134,6 +136,48 @@ TEST_P(LodTreeCuts, AgreeWithScanningEveryBoxBeforeAndAfterChanges) {
 }
 
 INSTANTIATE_TEST_SUITE_P(UniformViewCorridorField, LodTreeCuts, testing::Range(0, 4));
+
+// A view compares boxes as floats: none may be lost to what these cannot hold, wherever the land lies,
+// however large it is and however small or large its tolerances are; with every instruction set that this
+// machine has.
+TEST(ViewCutsOfPages, MissNoBoxWhateverTheNumbersAndTheInstructions) {
+  Random random(test_seed(21));
+  std::size_t found = 0, spare = 0;
+  const auto ask = [&](const LodTree& tree, const std::vector<LodEntry>& all, const ViewCut& v, bool count) {
+    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+      hwy::SetSupportedTargetsForTest(target);
+      SCOPED_TRACE(hwy::TargetName(target));
+      std::size_t ignored = 0;
+      expect_no_box_missed(tree, all, *make_surface(v), found, count ? spare : ignored);
+    }
+    hwy::SetSupportedTargetsForTest(0);
+  };
+  for (const double away : {0.0, 5e6, -3e9})
+    for (const double size : {1e-5, 1.0, 1e7}) {
+      const auto placed = [&](double v) { return away * std::max(size, 1.0) + size * v; };
+      std::vector<LodEntry> all;
+      for (std::uint64_t k = 0; k < 3000; ++k) {
+        LodEntry e = random_box(random, k);
+        LodBox& b = e.box;
+        b = {placed(b.xmin), placed(b.ymin),         placed(b.xmax),
+             placed(b.ymax), b.bottom * float(size), b.top * float(size)};
+        if (b.xmin < b.xmax && b.ymin < b.ymax) all.push_back(e);
+      }
+      const LodTree tree = LodTree::build(all);
+      for (int n = 0; n < 40; ++n) {
+        ViewCut v = random.view(3000);
+        v.eye = {placed(v.eye.x), placed(v.eye.y), size * v.eye.z};
+        v.look = {placed(v.look.x), placed(v.look.y), size * v.look.z};
+        v.far *= size, v.lowest *= size, v.highest *= size;
+        if (n % 10 == 7) v.pixel_error = 0;
+        if (n % 10 == 8) v.pixel_error = 1e-30;
+        if (n % 10 == 9) v.pixel_error = 1e30;
+        ask(tree, all, v, n % 10 < 7);
+      }
+    }
+  EXPECT_GT(found, 1000u);
+  EXPECT_LE(double(spare), 0.25 * double(found) + 100) << "and few that it does not meet";
+}
 
 // --- Extractions of a database.
 

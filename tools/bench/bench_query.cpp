@@ -96,7 +96,11 @@ class QueryBench {
   Question uniform(double error, const Extent& region) const {
     const float limit = float_at_most(error);
     return {
-        make_surface(UniformCut{.error = error, .region = Region::inside(region)}), region, error, error,
+        make_surface(UniformCut{.error = error, .region = Region::inside(region)}),
+        region,
+        error,
+        error,
+        {},
         [=](const LodBox& b) {
           return Extent{b.xmin, b.ymin, b.xmax, b.ymax}.meets(region) && b.bottom <= limit && limit < b.top;
         }};
@@ -134,7 +138,7 @@ class QueryBench {
               .highest = heights_.second};
     const double a = between(0, 2 * M_PI);
     v.look = {v.eye.x + 5000 * std::cos(a), v.eye.y + 5000 * std::sin(a), v.eye.z - 1000};
-    Question q{make_surface(v), Extent::nothing(), INFINITY, 0, {}};
+    Question q{make_surface(v), Extent::nothing(), INFINITY, 0, ConeOverRegion{}, {}};
     for (const Point& p : footprint(v)) {
       q.bounds.add(p);
       q.high = std::max(q.high, q.cut->at(p));
@@ -142,8 +146,10 @@ class QueryBench {
     // The eye lies over the region, or near it; and a patch is asked for over its whole domain, which reaches
     // beyond the region.
     q.low = 0, q.high += q.cut->at({v.eye.x + side, v.eye.y + side});
-    q.meets = [corners = footprint(v), x = v.eye.x, y = v.eye.y,
-               slope = q.cut->at({v.eye.x + 1, v.eye.y})](const LodBox& b) {
+    *q.view = {{v.eye.x, v.eye.y}, q.cut->at({v.eye.x + 1, v.eye.y}), footprint(v)};
+    q.meets = [view = *q.view](const LodBox& b) {
+      const auto& [eye, slope, corners] = view;
+      const double x = eye.x, y = eye.y;
       const double dx = std::max({b.xmin - x, x - b.xmax, 0.0}), dy = std::max({b.ymin - y, y - b.ymax, 0.0});
       const double fx = std::max(std::abs(b.xmin - x), std::abs(b.xmax - x)),
                    fy = std::max(std::abs(b.ymin - y), std::abs(b.ymax - y));

@@ -8,8 +8,10 @@
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
 #include <cmath>
+#include <cstring>
 
 #include "db/error.h"
+#include "db/vectorized.h"
 
 namespace patchwork::cli {
 
@@ -22,7 +24,63 @@ using Corner = bg::model::point<double, 3, bg::cs::cartesian>;
 using Box = bg::model::box<Corner>;
 using Entry = std::pair<Box, std::uint32_t>;
 
-// All boxes in six arrays, compared in vectors.
+// The sides of a view's region for a vector of eight: inside are the points with nx x + ny y <= most. What is
+// positive of a normal stands apart from what is negative, so that a box's innermost corner needs no choice.
+struct EightSides {
+  static constexpr std::size_t kSides = 8;
+  double nx_up[kSides] = {}, nx_down[kSides] = {}, ny_up[kSides] = {}, ny_down[kSides] = {}, most[kSides];
+
+  explicit EightSides(const std::vector<Point>& corners) {
+    std::fill_n(most, kSides, INFINITY);
+    for (std::size_t k = 0; k < std::min(corners.size(), kSides); ++k) {
+      const Point &a = corners[k], &b = corners[(k + 1) % corners.size()];
+      const double nx = b.y - a.y, ny = a.x - b.x;
+      nx_up[k] = std::max(nx, 0.0), nx_down[k] = std::min(nx, 0.0);
+      ny_up[k] = std::max(ny, 0.0), ny_down[k] = std::min(ny, 0.0);
+      most[k] = nx * a.x + ny * a.y;
+    }
+  }
+};
+
+double lesser(double a, double b) { return a < b ? a : b; }
+double greater(double a, double b) { return a > b ? a : b; }
+
+PATCHWORK_VECTORIZED void near_enough(const LodPage& page, Point eye, double k, const Extent& bounds,
+                                      std::uint8_t* __restrict hit) {
+  double least[LodPage::kSlots];
+  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s) {
+    const double left = page.xmin[s] - eye.x, right = eye.x - page.xmax[s];
+    const double below = page.ymin[s] - eye.y, above = eye.y - page.ymax[s];
+    const double fx = lesser(left, right), fy = lesser(below, above);
+    const double dx = greater(greater(left, right), 0), dy = greater(greater(below, above), 0);
+    const double bottom = page.bottom[s], top = page.top[s];
+    const double outside = greater(greater(page.xmin[s] - bounds.xmax, bounds.xmin - page.xmax[s]),
+                                   greater(page.ymin[s] - bounds.ymax, bounds.ymin - page.ymax[s]));
+    least[s] = lesser(lesser(k * (fx * fx + fy * fy) - bottom * bottom, top * top - k * (dx * dx + dy * dy)),
+                      -outside);
+  }
+  for (std::uint32_t s = 0; s < LodPage::kSlots; ++s) hit[s] = std::uint8_t(least[s] >= 0);
+}
+
+// Few boxes are left to be asked, so a vector takes the sides of one box.
+PATCHWORK_VECTORIZED std::uint64_t keep_inside(const LodPage& page, const EightSides& e, std::uint64_t met) {
+  using Numbers = double __attribute__((vector_size(EightSides::kSides * sizeof(double))));
+  using Bytes = std::int8_t __attribute__((vector_size(EightSides::kSides)));
+  Numbers nx_up, nx_down, ny_up, ny_down, most;
+  std::memcpy(&nx_up, e.nx_up, sizeof(Numbers)), std::memcpy(&nx_down, e.nx_down, sizeof(Numbers));
+  std::memcpy(&ny_up, e.ny_up, sizeof(Numbers)), std::memcpy(&ny_down, e.ny_down, sizeof(Numbers));
+  std::memcpy(&most, e.most, sizeof(Numbers));
+  for (std::uint64_t left = met; left; left &= left - 1) {
+    const auto s = std::uint32_t(std::countr_zero(left));
+    const Numbers at =
+        (nx_up * page.xmin[s] + nx_down * page.xmax[s]) + (ny_up * page.ymin[s] + ny_down * page.ymax[s]);
+    const Bytes out = __builtin_convertvector(at > most, Bytes);
+    met &= ~(std::uint64_t{std::bit_cast<std::uint64_t>(out) != 0} << s);
+  }
+  return met;
+}
+
+// All boxes as they are, in six arrays, compared in vectors.
 class Scan : public Index {
  public:
   explicit Scan(const Boxes& boxes) {
@@ -33,12 +91,26 @@ class Scan : public Index {
     }
   }
   void find(const Question& q, Ids& ids) const override {
-    for (const LodPage& page : pages_)
-      for (std::uint64_t left = q.cut->hits(page, false).met; left; left &= left - 1)
-        ids.push_back(page.ref[std::countr_zero(left)]);
+    if (!q.view) return scan([&](const LodPage& page) { return q.cut->hits(page, false).met; }, ids);
+    const ConeOverRegion& v = *q.view;
+    const EightSides sides(v.corners);
+    scan(
+        [&](const LodPage& page) {
+          std::uint8_t hit[LodPage::kSlots];
+          near_enough(page, v.eye, v.slope * v.slope, q.bounds, hit);
+          const std::uint64_t met = page.mask_of_used(hit);
+          return met ? keep_inside(page, sides, met) : met;
+        },
+        ids);
   }
 
  private:
+  template <class Hits>
+  void scan(Hits hits, Ids& ids) const {
+    for (const LodPage& page : pages_)
+      for (std::uint64_t left = hits(page); left; left &= left - 1)
+        ids.push_back(page.ref[std::countr_zero(left)]);
+  }
   std::vector<LodPage> pages_;
 };
 

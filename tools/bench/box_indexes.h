@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,11 +18,20 @@ namespace patchwork::cli {
 using Boxes = std::vector<LodEntry>;
 using Ids = std::vector<std::uint64_t>;
 
+/// A view as peers ask it: a box is met if it meets the convex region of these corners, and its errors meet
+/// slope times the distances from the eye.
+struct ConeOverRegion {
+  Point eye;
+  double slope = 0;
+  std::vector<Point> corners;  ///< counterclockwise
+};
+
 /// All boxes that a cut meets. `bounds` and the errors from `low` to `high` hold every one of them.
 struct Question {
   std::unique_ptr<CutSurface> cut;
   Extent bounds;
   double low, high;
+  std::optional<ConeOverRegion> view;        ///< where it is one
   std::function<bool(const LodBox&)> meets;  ///< what a peer must test behind its own search
 };
 

@@ -1,0 +1,140 @@
+// The view: a tolerance that grows with the distance from an eye, over what it sees.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "query/cut.h"
+#include "query/ranged_surface.h"
+#include "query/view_page.h"
+
+namespace patchwork {
+
+namespace {
+
+using Vector = std::array<double, 3>;
+Vector operator+(const Vector& a, const Vector& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+Vector operator*(double s, const Vector& a) { return {s * a[0], s * a[1], s * a[2]}; }
+Vector cross(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+Vector normalised(const Vector& a) { return (1 / std::hypot(a[0], a[1], a[2])) * a; }
+
+// Andrew's monotone chain (1979).
+std::vector<Point> convex_hull(std::vector<Point> points) {
+  std::sort(points.begin(), points.end(),
+            [](const Point& a, const Point& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  std::vector<Point> hull;
+  const auto add = [&](const Point& p, std::size_t least) {
+    while (hull.size() >= least + 2 && turn(hull[hull.size() - 2], hull.back(), p) <= 0) hull.pop_back();
+    hull.push_back(p);
+  };
+  for (const Point& p : points) add(p, 0);
+  const std::size_t lower = hull.size();
+  for (std::size_t k = points.size() - 1; k-- > 0;) add(points[k], lower - 1);
+  hull.pop_back();
+  return hull;
+}
+
+class ViewSurface : public CutSurface {
+ public:
+  explicit ViewSurface(const ViewCut& cut)
+      : corners_(footprint(cut)),
+        view_({cut.eye.x, cut.eye.y},
+              cut.in_space ? std::max({0.0, cut.eye.z - cut.highest, cut.lowest - cut.eye.z}) : 0,
+              cut.pixel_error * 2 * std::tan(cut.fov_degrees * (M_PI / 360)) / cut.height) {
+    for (std::size_t k = 0; corners_.size() >= 3 && k < corners_.size(); ++k)
+      view_.add_side(corners_[k], corners_[(k + 1) % corners_.size()]);
+  }
+
+  double at(Point p) const override {
+    return view_.slope * std::hypot(p.x - view_.eye.x, p.y - view_.eye.y, view_.above);
+  }
+
+  // The frame's axes are orthogonal, so the nearest point of a rectangle is found axis by axis.
+  ToleranceRange over(const Frame& frame, const LatticeRect& r) const override {
+    const Point e = frame.to_lattice(view_.eye.x, view_.eye.y);
+    const double i = frame.step_i(), j = frame.step_j();
+    const auto near = [](double v, double a, double b) { return std::max({a - v, v - b, 0.0}); };
+    const auto far = [](double v, double a, double b) { return std::max(std::abs(a - v), std::abs(b - v)); };
+    return {view_.slope * std::hypot(i * near(e.x, r.i0, r.i1), j * near(e.y, r.j0, r.j1), view_.above),
+            view_.slope * std::hypot(i * far(e.x, r.i0, r.i1), j * far(e.y, r.j0, r.j1), view_.above)};
+  }
+
+  // Two convex sets are apart if a side of one of them parts them.
+  bool meets(const Grid& grid, const GridShape::Block& b) const override {
+    if (view_.sides == 0) return false;
+    const LatticeRect d = grid.info.shape.domain(b.level, b.bx, b.by);
+    const Frame& f = grid.info.frame;
+    const Corners rect = f.corners(d);
+    for (std::size_t k = 0; k < view_.sides; ++k)
+      if (std::all_of(rect.begin(), rect.end(), [&](const Point& p) { return view_.beyond(k, p); }))
+        return false;
+    const LatticeRect seen = f.lattice_bounds(corners_);
+    return seen.i0 <= d.i1 && d.i0 <= seen.i1 && seen.j0 <= d.j1 && d.j0 <= seen.j1;
+  }
+
+  LodHits hits(const LodPage& page, bool inside) const override {
+    return view_.sides == 0 ? LodHits() : view_.hits(page, inside);
+  }
+
+ private:
+  std::vector<Point> corners_;
+  PageView view_;
+};
+
+}  // namespace
+
+std::vector<Point> footprint(const ViewCut& v) {
+  const Vector eye{v.eye.x, v.eye.y, v.eye.z};
+  const Vector forward = normalised({v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z});
+  const bool steep = std::hypot(forward[0], forward[1]) < 1e-9;
+  const Vector right = normalised(cross(forward, steep ? Vector{0, 1, 0} : Vector{0, 0, 1}));
+  const Vector up = cross(right, forward);
+  const double ty = std::tan(v.fov_degrees * (M_PI / 360)), tx = ty * v.width / v.height;
+  const auto corner = [&](double a, double b) {
+    return eye + v.far * (forward + (a * tx) * right + (b * ty) * up);
+  };
+  const Vector corners[] = {corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)};
+  // The corners of the pyramid between the planes of the lowest and the highest terrain.
+  std::vector<Point> points;
+  const auto clip = [&](const Vector& a, const Vector& b) {
+    for (const Vector& p : {a, b})
+      if (p[2] >= v.lowest && p[2] <= v.highest) points.push_back({p[0], p[1]});
+    for (const double z : {v.lowest, v.highest})
+      if ((a[2] < z) != (b[2] < z)) {
+        const double t = (z - a[2]) / (b[2] - a[2]);
+        points.push_back({a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])});
+      }
+  };
+  for (int k = 0; k < 4; ++k) clip(eye, corners[k]), clip(corners[k], corners[(k + 1) % 4]);
+  return points.size() < 3 ? std::vector<Point>() : convex_hull(std::move(points));
+}
+
+ViewCut over_terrain_of(const Database& db, ViewCut v) {
+  v.lowest = INFINITY, v.highest = -INFINITY, v.far = 1;
+  for (const Grid& g : db.grids()) {
+    const double rim = g.info.rim_error;  // what the half cell beyond the samples may add
+    v.lowest = std::min(v.lowest, g.info.lowest - rim), v.highest = std::max(v.highest, g.info.highest + rim);
+  }
+  if (db.grids().empty()) v.lowest = v.highest = 0;
+  const Extent e = db.grids().empty() ? Extent{} : db.extent();
+  for (const double x : {e.xmin, e.xmax})
+    for (const double y : {e.ymin, e.ymax})
+      for (const double z : {v.lowest, v.highest})
+        v.far = std::max(v.far, std::hypot(x - v.eye.x, y - v.eye.y, z - v.eye.z));
+  return v;
+}
+
+std::unique_ptr<CutSurface> make_surface(const ViewCut& v) {
+  for (const double n : {v.eye.x, v.eye.y, v.eye.z, v.look.x, v.look.y, v.look.z, v.lowest, v.highest})
+    require(std::isfinite(n), "view", "eye, look and heights must be numbers");
+  require(std::hypot(v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z) > 0, "view",
+          "eye and look are the same point");
+  require(v.fov_degrees > 0 && v.fov_degrees < 180, "fov", "it must be between 0 and 180 degrees");
+  require(v.width > 0 && v.height > 0, "size", "width and height must be pixels, at least 1");
+  require(is_error(v.pixel_error), "pixel-error", "it must be a number of pixels, 0 or more");
+  require(v.far > 0 && std::isfinite(v.far) && v.lowest <= v.highest, "view", "it has no extent");
+  return std::make_unique<ViewSurface>(v);
+}
+
+}  // namespace patchwork

@@ -1,0 +1,38 @@
+// Which boxes of an R-tree page a view meets (used by cut_view.cpp).
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "db/lod_page.h"
+
+namespace patchwork {
+
+/// A view as a question to pages: the squared tolerance is slope^2 times the squared distance to an eye, over
+/// a convex region.
+struct PageView {
+  static constexpr std::size_t kMostSides = 24;  ///< a pyramid's edges between two planes have fewer ends
+
+  PageView(Point eye, double above, double slope);
+  /// A side of the region, counterclockwise. REQUIRES: a != b; fewer than kMostSides are there.
+  void add_side(Point a, Point b);
+  bool beyond(std::size_t side, Point p) const { return nx[side] * p.x + ny[side] * p.y > most[side]; }
+
+  /// Never too few: boxes are compared as floats, with what floats lose allowed for. `inside`: all of the
+  /// page's boxes lie in the region.
+  LodHits hits(const LodPage& page, bool inside) const;
+
+  Point eye;
+  double above, slope;  ///< metres from the eye to the plane; metres of tolerance a metre of distance
+  float k_near, k_far, height2;       ///< a little less than slope^2, a little more; above^2
+  Extent bounds = Extent::nothing();  ///< of the region
+  double reach = 0;                   ///< metres from the eye to the furthest corner, along x and y together
+  /// Inside are the points with nx x + ny y <= most; |(nx, ny)| = 1. Those behind `sides` hold every point.
+  /// What is positive of a normal stands apart from what is negative, so that a box's innermost and outermost
+  /// corner need no choice.
+  std::size_t sides = 0;
+  std::array<double, kMostSides> nx{}, ny{}, most;
+  std::array<float, kMostSides> nx_up{}, nx_down{}, ny_up{}, ny_down{};
+};
+
+}  // namespace patchwork

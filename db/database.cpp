@@ -327,14 +327,9 @@ Extent Database::extent() const {
   return all;
 }
 
-double HeightRange::middle() const {
-  return lowest <= highest ? std::nearbyint(0.5 * (lowest + highest)) : 0;
-}
-
 HeightRange Database::heights() const {
   HeightRange all;
-  for (const Grid& g : impl_->grids)
-    all.lowest = std::min(all.lowest, g.info.lowest), all.highest = std::max(all.highest, g.info.highest);
+  for (const Grid& g : impl_->grids) all.add({g.info.lowest, g.info.highest});
   return all;
 }
 

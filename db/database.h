@@ -60,13 +60,6 @@ struct RemoveReport {
   double seconds = 0;
 };
 
-/// Metres; lowest > highest where there is none.
-struct HeightRange {
-  double lowest = std::numeric_limits<double>::infinity(), highest = -std::numeric_limits<double>::infinity();
-  /// To a metre; 0 where there is none.
-  double middle() const;
-};
-
 /// One state of a database file. Reading is safe from many threads, beside a writer in this or another
 /// process; refreshing, importing and removing are not, and move this object to a new state.
 class Database {

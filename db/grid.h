@@ -1,8 +1,11 @@
 // What a database knows of one grid and of each of its patches, heights apart.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -14,6 +17,16 @@
 namespace patchwork {
 
 using Digest = std::array<std::uint8_t, 16>;
+
+/// Metres; lowest > highest where there is none.
+struct HeightRange {
+  double lowest = std::numeric_limits<double>::infinity(), highest = -std::numeric_limits<double>::infinity();
+  void add(const HeightRange& o) {
+    lowest = std::min(lowest, o.lowest), highest = std::max(highest, o.highest);
+  }
+  /// To a metre; 0 where there is none.
+  double middle() const { return lowest <= highest ? std::nearbyint(0.5 * (lowest + highest)) : 0; }
+};
 
 /// The facts of a grid. A sample's height is `quantum * (code_origin + code) + base` metres.
 struct GridInfo {
@@ -29,6 +42,9 @@ struct GridInfo {
   double quantisation = 0;  ///< q, metres: largest distance between a sample and its stored form
   double rim_error = 0;     ///< metres added to the bound beyond the outer samples (extrapolated half cell)
   double lowest = 0, highest = 0;  ///< of its samples, metres
+  /// Metres that its level-0 surface may stand above or below all samples: half cells beyond the outer ones,
+  /// and what smooth interpolants (k = 1, 2) make of rough samples.
+  double overshoot = 0;
   bool holes = false;
   /// How the source file held its samples, so that they can be written back as they were: a raw sample is
   /// `quantum / raw_scale * (code_origin + code)`, of a GDAL type, e.g. "UInt16".
@@ -37,6 +53,8 @@ struct GridInfo {
   double raw_scale = 1;               ///< metres per raw unit
   std::optional<double> nodata = {};  ///< the raw value that meant no data, where one was declared
   double height(double code) const { return quantum * (double(code_origin) + code) + base; }
+  /// Of its level-0 surface, whatever the smoothness.
+  HeightRange surface_heights() const { return {lowest - overshoot, highest + overshoot}; }
   /// Of the footprint, rounding allowed for.
   Extent bounds() const { return frame.bounds(shape.footprint()); }
 };

@@ -128,19 +128,25 @@ class Importer {
     }
   }
 
-  // Second differences across the border: what the half cell beyond it may hide.
+  // Differences across the border of a pixel-is-area grid: how far the half cell beyond it leaves the outer
+  // samples (first ones), and what it may hide (second ones).
   void note_rim(const Ingest::Band& band, int y) {
     const int w = shape().width(), h = shape().height();
     if (!shape().pixel_is_area()) return;
     const Lattice& l = band.levels[0];
-    const auto bend = [&](int i, int j, int di, int dj) -> double {
-      for (int n = 0; n < 3 && !band.valid.empty(); ++n)
-        if (!band.valid[size_t(j + n * dj - l.first()) * size_t(w) + size_t(i + n * di)]) return 0;
-      return std::abs(l.row(j)[i] - 2 * l.row(j + dj)[i + di] + l.row(j + 2 * dj)[i + 2 * di]);
+    const auto note = [&](int i, int j, int di, int dj, Rim& rim) {
+      const auto at = [&](int n) { return double(l.row(j + n * dj)[i + n * di]); };
+      const auto valid = [&](int n) {
+        return band.valid.empty() ||
+               band.valid[size_t(j + n * dj - l.first()) * size_t(w) + size_t(i + n * di)];
+      };
+      if (!valid(0) || !valid(1)) return;
+      rim.step = std::max(rim.step, std::abs(at(0) - at(1)));
+      if ((di ? w : h) > 2 && valid(2)) rim.bend = std::max(rim.bend, std::abs(at(0) - 2 * at(1) + at(2)));
     };
-    if (w > 2) rim_i_ = std::max({rim_i_, bend(0, y, 1, 0), bend(w - 1, y, -1, 0)});
-    if (h > 2 && (y == 0 || y == h - 1))
-      for (int i = 0; i < w; ++i) rim_j_ = std::max(rim_j_, bend(i, y, 0, y == 0 ? 1 : -1));
+    note(0, y, 1, 0, rim_i_), note(w - 1, y, -1, 0, rim_i_);
+    if (y == 0 || y == h - 1)
+      for (int i = 0; i < w; ++i) note(i, y, 0, y == 0 ? 1 : -1, rim_j_);
   }
 
   const Lattice& lattice(const Ingest::Band& band, int level) const {
@@ -232,7 +238,10 @@ class Importer {
   void finish_grid() {
     GridInfo& g = grid_.info;
     g.digest = digest_.get();
-    g.rim_error = kRimFactor * (rim_i_ + rim_j_) * std::abs(g.quantum);
+    g.rim_error = kRimFactor * (rim_i_.bend + rim_j_.bend) * std::abs(g.quantum);
+    // Half a step along each axis; and at a corner the one's step may be twice as large, extrapolated itself.
+    const double rim = 0.5 * (rim_i_.step + rim_j_.step + std::min(rim_i_.step, rim_j_.step));
+    g.overshoot = g.quantisation + (rim + errors_->largest_departure()) * std::abs(g.quantum);
     for (const Grid& other : db_.grids)
       if (other.info.digest == g.digest) report_.duplicate_of = other.info.name;
     report_.name = g.name, report_.accuracy = g.accuracy, report_.quantisation = g.quantisation;
@@ -325,7 +334,10 @@ class Importer {
   std::optional<PatchErrors> errors_;
   Grid grid_;
   DigestBuilder digest_;
-  double rim_i_ = 0, rim_j_ = 0;
+  struct Rim {
+    double step = 0, bend = 0;  // the largest first and second difference across it, codes
+  };
+  Rim rim_i_, rim_j_;
 };
 
 }  // namespace

@@ -352,6 +352,12 @@ void PatchErrors::note(int level, int segment, const Positions& positions, int p
   }
 }
 
+double PatchErrors::largest_departure() const {
+  float largest = 0;
+  for (const Largest& block : levels_[0].blocks) largest = std::max(largest, block.smooth);
+  return double(largest);
+}
+
 std::array<double, 3> PatchErrors::of(int level, int bx, int by) const {
   const Largest& block =
       levels_[size_t(level)].blocks[size_t(by) * size_t(shape_.blocks_i(level)) + size_t(bx)];

@@ -40,6 +40,8 @@ class PatchErrors {
   /// Errors in codes for k = 0, 1, 2; what is below 2^-30 of a code is rounding of the measurement and counts
   /// as 0.
   std::array<double, 3> of(int level, int bx, int by) const;
+  /// The largest error of k = 1, 2 at level 0, codes: how far they depart from the bilinear surface.
+  double largest_departure() const;
 
  private:
   class Strip;

@@ -79,6 +79,7 @@ nlohmann::json facts_of(const GridInfo& g) {
           {"rim_error", g.rim_error},
           {"lowest", g.lowest},
           {"highest", g.highest},
+          {"overshoot", g.overshoot},
           {"holes", g.holes},
           {"sample_type", g.sample_type},
           {"sample_bytes", g.sample_bytes},
@@ -103,6 +104,9 @@ GridInfo info_from(const nlohmann::json& f) {
   g.code_origin = f.at("code_origin"), g.quantisation = f.at("quantisation"), g.rim_error = f.at("rim_error");
   g.holes = f.at("holes"), g.sample_type = f.at("sample_type"), g.sample_bytes = f.at("sample_bytes");
   g.raw_scale = f.at("raw_scale"), g.lowest = f.at("lowest"), g.highest = f.at("highest");
+  // Files of earlier versions do not say it: no surface through samples stands further beyond their range.
+  constexpr double kMostOvershoot = 2.1;
+  g.overshoot = f.value("overshoot", kMostOvershoot * (g.highest - g.lowest));
   if (!f.at("nodata").is_null()) g.nodata = f.at("nodata").get<double>();
   return g;
 }

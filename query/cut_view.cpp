@@ -111,12 +111,10 @@ std::vector<Point> footprint(const ViewCut& v) {
 }
 
 ViewCut over_terrain_of(const Database& db, ViewCut v) {
-  v.lowest = INFINITY, v.highest = -INFINITY, v.far = 1;
-  for (const Grid& g : db.grids()) {
-    const double rim = g.info.rim_error;  // what the half cell beyond the samples may add
-    v.lowest = std::min(v.lowest, g.info.lowest - rim), v.highest = std::max(v.highest, g.info.highest + rim);
-  }
-  if (db.grids().empty()) v.lowest = v.highest = 0;
+  HeightRange all;
+  for (const Grid& g : db.grids()) all.add(g.info.surface_heights());
+  if (db.grids().empty()) all = {0, 0};
+  v.lowest = all.lowest, v.highest = all.highest, v.far = 1;
   const Extent e = db.grids().empty() ? Extent{} : db.extent();
   for (const double x : {e.xmin, e.xmax})
     for (const double y : {e.ymin, e.ymax})

@@ -44,9 +44,9 @@ Tile sampled_tile(const TileLattice& lattice, const TileKey& key) {
 // What a tile's patches say of it: do they come of one grid, and what do samples miss between them.
 struct PatchFacts {
   std::size_t patches = 0;
-  double accuracy = 0;                            // metres: of the grid, where there is only one
-  double unsampled = 0;                           // metres
-  double lowest = INFINITY, highest = -INFINITY;  // of their grids, metres
+  double accuracy = 0;   // metres: of the grid, where there is only one
+  double unsampled = 0;  // metres
+  HeightRange heights;   // of their grids' surfaces
 };
 
 // A patch with cells smaller than the distance of samples may stick out between these by as much as it
@@ -75,8 +75,7 @@ PatchFacts facts_of(const Database& db, const std::vector<Blend::Placed>& placed
     const Grid& grid = db.grid(p.id.grid());
     several |= only && only != &grid;
     only = &grid, ++f.patches;
-    f.lowest = std::min(f.lowest, grid.info.lowest - grid.info.rim_error);
-    f.highest = std::max(f.highest, grid.info.highest + grid.info.rim_error);
+    f.heights.add(grid.info.surface_heights());
     f.unsampled = std::max(f.unsampled, missed(grid, p.id, spacing));
   }
   if (only && !several) f.accuracy = only->info.accuracy + only->info.quantisation;
@@ -170,7 +169,7 @@ struct TileMaker::Impl {
     const double shift = blend->impl().base;
     f.lowest = double(s[0]) + shift, f.highest = double(s[1]) + shift;
     // All of its data may lie between its samples.
-    if (!(f.lowest <= f.highest)) f.lowest = patches.lowest, f.highest = patches.highest;
+    if (!(f.lowest <= f.highest)) f.lowest = patches.heights.lowest, f.highest = patches.heights.highest;
     f.bound = double(s[3]), f.holes = s[4] > 0, f.patches = patches.patches;
     f.reducible = patches.unsampled + (improvable ? std::max(0.0, f.bound - patches.accuracy) : 0);
     f.error = double(s[2]) + f.reducible;

@@ -252,5 +252,45 @@ TEST(StrictBlend, AnswersEverywhereWhereTheErrorIsExactlyWhatThereIs) {
   }
 }
 
+// A view sees terrain between two planes: nothing of a grid's surface may lie beyond them, neither half a
+// cell outside its samples nor where a smooth interpolant swings past a tower.
+TEST(SurfaceHeights, HoldEverySurfaceOfAGrid) {
+  const auto steep = [](int i, int j) { return 3.0 * i - 2.0 * j; };
+  const auto tower = [](int i, int j) { return i / 2 == 15 && j / 2 == 17 ? 100.0 : 0.0; };
+  const auto rough = [](int i, int j) { return 40 * std::sin(1.9 * i + 0.3 * j) * std::cos(2.3 * j); };
+  const auto with_holes = [=](int i, int j) {
+    return (i - 20) * (i - 20) + (j - 9) * (j - 9) < 30 ? NAN : rough(i, j) + steep(i, j);
+  };
+  std::mt19937_64 random(test_seed(31));
+  double closest = 0, beyond_samples = INFINITY;
+  for (const auto& at : std::vector<std::function<double(int, int)>>{steep, tower, rough, with_holes})
+    for (const bool area : {true, false}) {
+      GridFile file{
+          .width = 50, .height = 40, .geotransform = rotated(0, 0, 20, 10, 10), .pixel_is_area = area};
+      file.nodata = -9999, file.at = at;
+      const Land land({file});
+      const GridInfo& g = land.db().grids()[0].info;
+      const HeightRange all = g.surface_heights();
+      double lowest = INFINITY, highest = -INFINITY;
+      Points points = random_points(land.db().extent(), 60000, random);
+      const LatticeRect rim = g.shape.footprint();
+      for (int n = 0; n <= 4000; ++n) {
+        const double i = rim.i0 + (rim.i1 - rim.i0) * n / 4000, j = rim.j0 + (rim.j1 - rim.j0) * n / 4000;
+        points.add(g.frame.to_domain(i, rim.j0)), points.add(g.frame.to_domain(i, rim.j1));
+        points.add(g.frame.to_domain(rim.i0, j)), points.add(g.frame.to_domain(rim.i1, j));
+      }
+      for (int k = 0; k <= 2; ++k)
+        for (const double h : evaluate(land.db(), 0, points, {.smoothness = k}).height)
+          if (!std::isnan(h)) lowest = std::min(lowest, h), highest = std::max(highest, h);
+      ASSERT_LT(lowest, highest);
+      EXPECT_GE(lowest, all.lowest);
+      EXPECT_LE(highest, all.highest);
+      const double past = std::max(g.lowest - lowest, highest - g.highest);
+      closest = std::max(closest, past / g.overshoot), beyond_samples = std::min(beyond_samples, past);
+    }
+  EXPECT_GT(closest, 0.6) << "and it is no wider than it must be";
+  EXPECT_LT(beyond_samples, 1e-3) << "a plane of samples alone has none";
+}
+
 }  // namespace
 }  // namespace patchwork

@@ -186,8 +186,7 @@ CastSurface surface_of(std::function<double(double, double)> z, double lowest, d
           .step = step};
 }
 
-CastSurface surface_of(const Database& db, std::span<const PatchId> patches, const Evaluator& blend,
-                       int smoothness) {
+CastSurface surface_of(const Database& db, std::span<const PatchId> patches, const Evaluator& blend) {
   CastSurface s{.heights =
                     [&blend](auto x, auto y, auto z) {
                       blend.at_points(x, y, {z, {}, {}, {}});
@@ -196,13 +195,10 @@ CastSurface surface_of(const Database& db, std::span<const PatchId> patches, con
                 .lowest = INFINITY,
                 .highest = -INFINITY,
                 .step = INFINITY};
-  for (const Grid& g : db.grids()) {
-    s.lowest = std::min(s.lowest, g.info.lowest - g.info.rim_error);
-    s.highest = std::max(s.highest, g.info.highest + g.info.rim_error);
-  }
-  // Bicubic surfaces pass their samples by less than the range of these.
-  const double beyond = smoothness > 0 ? s.highest - s.lowest : 0;
-  s.lowest -= beyond + 1, s.highest += beyond + 1;
+  HeightRange all;
+  for (const Grid& g : db.grids()) all.add(g.info.surface_heights());
+  const double beyond = db.coarsest_bottom();  // by so much a coarser patch may miss the level-0 surface
+  s.lowest = all.lowest - beyond, s.highest = all.highest + beyond;
   for (const PatchId id : patches) {
     const Frame& f = db.grid(id.grid()).info.frame;
     s.step = std::min(s.step, std::ldexp(f.finer_step(), id.level()) / 4);

@@ -23,9 +23,8 @@ struct CastSurface {
 
 CastSurface surface_of(std::function<double(double, double)> z, double lowest, double highest, double step);
 /// All that `blend` gives for `patches` of `db`; samples a quarter of the finest cell apart. REQUIRES: both
-/// outlive the result. `smoothness` is the blend's.
-CastSurface surface_of(const Database& db, std::span<const PatchId> patches, const Evaluator& blend,
-                       int smoothness);
+/// outlive the result.
+CastSurface surface_of(const Database& db, std::span<const PatchId> patches, const Evaluator& blend);
 
 struct CastOptions {
   std::optional<effects::Curvature> curvature = {};  ///< the ground sinks with its distance in the plane

@@ -116,7 +116,7 @@ TEST(RayCast, HitsOfABlendLieOnIt) {
   const Extraction x = extract(land.db(), {.error = 2});
   for (const int k : {0, 1, 2}) {
     const Blend blend(land.db(), x.patches, {.smoothness = k});
-    const CastSurface surface = surface_of(land.db(), x.patches, blend, k);
+    const CastSurface surface = surface_of(land.db(), x.patches, blend);
     const Camera camera{{200, 100, 480}, {900, 900, 300}, 60, 32, 18};
     const auto hits = cast(surface, camera, {});
     int covered = 0;

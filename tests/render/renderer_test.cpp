@@ -81,7 +81,7 @@ TEST_F(TerrainTest, TessellationAsPublishedExceedsWhatWasAsked) {
 TEST_F(TerrainTest, NoBackgroundInsideTheSilhouette) {
   const Extraction x = extract(db(), {.error = 0});
   const Blend best(db(), x.patches, {.smoothness = 1});
-  const CastSurface surface = surface_of(db(), x.patches, best, 1);
+  const CastSurface surface = surface_of(db(), x.patches, best);
   constexpr int kColumns = 128, kRows = 72, kRim = 2;  // the outline of the data is drawn to a pixel
   std::mt19937_64 random(test_seed(23));
   std::vector<Camera> cameras;

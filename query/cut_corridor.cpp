@@ -1,5 +1,8 @@
 // The corridor: a polyline that needs more accuracy than its surroundings.
 #include <algorithm>
+#include <boost/function_output_iterator.hpp>
+#include <boost/geometry.hpp>
+#include <boost/geometry/index/rtree.hpp>
 #include <cmath>
 #include <limits>
 
@@ -8,6 +11,8 @@
 namespace patchwork {
 
 namespace {
+
+namespace bg = boost::geometry;
 
 double distance(const Point& p, const Point& a, const Point& b) {
   const double dx = b.x - a.x, dy = b.y - a.y, length = dx * dx + dy * dy;
@@ -46,12 +51,13 @@ Distances distances(const Corners& r, const Point& a, const Point& b) {
 // patches is meant. (Distances from a centre, give or take half a diagonal, do not have that property.)
 class CorridorSurface : public RangedSurface {
  public:
-  explicit CorridorSurface(const CorridorCut& cut) : RangedSurface(cut.region), cut_(cut) {}
+  explicit CorridorSurface(const CorridorCut& cut)
+      : RangedSurface(cut.region), cut_(cut), sides_(sides_of(cut.line)) {}
 
   double at(Point p) const override {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k + 1 < cut_.line.size(); ++k)
-      nearest = std::min(nearest, distance(p, cut_.line[k], cut_.line[k + 1]));
+    double nearest = kFar;
+    each_near({p.x, p.y, p.x, p.y},
+              [&](const Point& a, const Point& b) { nearest = std::min(nearest, distance(p, a, b)); });
     return tolerance(nearest);
   }
   ToleranceRange over(const Frame& f, const LatticeRect& r) const override {
@@ -62,25 +68,57 @@ class CorridorSurface : public RangedSurface {
   ToleranceRange within(const Extent& e) const override { return over(e.corners(), 2 * kHair); }
 
  private:
+  using Corner = bg::model::point<double, 2, bg::cs::cartesian>;
+  using Box = bg::model::box<Corner>;
+  using Sides = bg::index::rtree<std::pair<Box, std::uint32_t>, bg::index::rstar<16>>;
+  static constexpr double kFar = std::numeric_limits<double>::infinity();
   static constexpr double kHair = 1e-9;  // of the distances, for their rounding
 
+  // Each side of the line by its bounds and the point it begins at.
+  static Sides sides_of(const std::vector<Point>& line) {
+    std::vector<Sides::value_type> all;
+    for (std::size_t k = 0; k + 1 < line.size(); ++k) {
+      const Point &a = line[k], &b = line[k + 1];
+      all.emplace_back(
+          Box({std::min(a.x, b.x), std::min(a.y, b.y)}, {std::max(a.x, b.x), std::max(a.y, b.y)}),
+          std::uint32_t(k));
+    }
+    return Sides(all);
+  }
+  // Calls visit(a, b) for the sides that are no further from `place` than the tolerance changes, and some
+  // that are.
+  template <class Visit>
+  void each_near(const Extent& place, Visit visit) const {
+    const double away = reach_ + slack(place, 4 * kHair);
+    const Box around({place.xmin - away, place.ymin - away}, {place.xmax + away, place.ymax + away});
+    sides_.query(bg::index::intersects(around),
+                 boost::make_function_output_iterator([&](const Sides::value_type& side) {
+                   visit(cut_.line[side.second], cut_.line[side.second + 1]);
+                 }));
+  }
+  double slack(const Extent& e, double hair) const {
+    return hair * (reach_ + std::hypot(e.xmax - e.xmin, e.ymax - e.ymin));
+  }
   double tolerance(double d) const {
     const double t =
         cut_.ramp > 0 ? std::clamp((d - cut_.width) / cut_.ramp, 0.0, 1.0) : double(d > cut_.width);
     return cut_.error + t * (cut_.outside - cut_.error);
   }
   ToleranceRange over(const Corners& r, double hair) const {
-    constexpr double kFar = std::numeric_limits<double>::infinity();
+    Extent place = Extent::nothing();
+    for (const Point& p : r) place.add(p);
     Distances all{kFar, kFar};
-    for (std::size_t k = 0; k + 1 < cut_.line.size(); ++k) {
-      const Distances d = distances(r, cut_.line[k], cut_.line[k + 1]);
+    each_near(place, [&](const Point& a, const Point& b) {
+      const Distances d = distances(r, a, b);
       all = {std::min(all.least, d.least), std::min(all.most, d.most)};
-    }
-    const double slack = hair * (all.most + std::hypot(r[2].x - r[0].x, r[2].y - r[0].y));
+    });
+    const double slack = this->slack(place, hair);
     const double a = tolerance(all.least - slack), b = tolerance(all.most + slack);
     return {std::min(a, b), std::max(a, b)};
   }
   CorridorCut cut_;
+  double reach_ = cut_.width + cut_.ramp;  // metres: beyond it the tolerance is the same everywhere
+  Sides sides_;
 };
 
 }  // namespace

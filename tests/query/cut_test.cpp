@@ -340,6 +340,48 @@ TEST_F(CutTest, AFootprintHoldsEveryPointThatIsSeen) {
   EXPECT_GT(outside_smaller, 100) << "negative control: a footprint 60 m smaller misses some";
 }
 
+// Long lines are asked for their near sides alone.
+TEST_F(CutTest, ACorridorOfManyPointsIsTheClosestOfItsSides) {
+  Random random(test_seed(22));
+  for (int n = 0; n < 20; ++n) {
+    CorridorCut all = random.corridor(2000);
+    all.line = {{random.uniform(-2000, 2000), random.uniform(-2000, 2000)}};
+    for (int k = 0; k < 300; ++k)
+      all.line.push_back(
+          {all.line.back().x + random.uniform(-60, 60), all.line.back().y + random.uniform(-60, 60)});
+    if (n % 5 == 4) std::swap(all.error, all.outside);  // a strip that needs less
+    const auto cut = make_surface(all);
+    std::vector<std::unique_ptr<CutSurface>> sides;
+    for (std::size_t k = 0; k + 1 < all.line.size(); ++k) {
+      CorridorCut one = all;
+      one.line = {all.line[k], all.line[k + 1]};
+      sides.push_back(make_surface(one));
+    }
+    const bool less = all.error < all.outside;
+    const auto closer = [&](double a, double b) { return less ? std::min(a, b) : std::max(a, b); };
+    int outside = 0;
+    for (int k = 0; k < 200; ++k) {
+      const Point p{random.uniform(-2500, 2500), random.uniform(-2500, 2500)};
+      const double angle = random.uniform(0, 7), c = 7 * std::cos(angle), s = 7 * std::sin(angle);
+      const Frame frame = Frame::from_trusted({p.x, c, -s, p.y, s, c});
+      const LatticeRect rect{0, 0, random.uniform(1, 40), random.uniform(1, 40)};
+      double at = sides[0]->at(p);
+      ToleranceRange range = sides[0]->over(frame, rect);
+      for (const auto& side : sides) {
+        at = closer(at, side->at(p));
+        const ToleranceRange one = side->over(frame, rect);
+        range = {closer(range.low, one.low), closer(range.high, one.high)};
+      }
+      const ToleranceRange r = cut->over(frame, rect);
+      EXPECT_EQ(cut->at(p), at);
+      EXPECT_NEAR(r.low, range.low, 1e-6);
+      EXPECT_NEAR(r.high, range.high, 1e-6);
+      outside += std::abs(at - all.outside) < 1e-9;
+    }
+    EXPECT_LT(outside, 200);
+  }
+}
+
 TEST_F(CutTest, NeighbouringRegionsOfOneCutTakeTheSamePatchesWhereTheyOverlap) {
   Random random(test_seed(5));
   for (int n = 0; n < 50; ++n) {

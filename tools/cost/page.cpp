@@ -35,8 +35,10 @@ constexpr Section kSections[] = {
      "it less error costs little, on the other much; where time falls by less than a fifth there is none. "
      "Time is that of finding the patches, reading them from the file and evaluating the picture."},
     {"stages", "Where the time goes",
-     "The same steps in order, stage by stage, with nothing in memory but what the operating system keeps of "
-     "the file. The uniform grid stands beside each step with its coarsest level that is as close to the "
+     "The same steps in order, stage by stage; database and GeoTIFF are open, with nothing in memory but "
+     "what "
+     "the operating system keeps of their files. The uniform grid stands beside each step with its coarsest "
+     "level that is as close to the "
      "best; "
      "where it is missing, none is."},
     {"shares", "Where the time goes, as parts", "The same, each step by itself."},

@@ -140,8 +140,8 @@ double UniformGrid::read(int level, const Extent& window, int side) const {
             height = std::clamp(int(std::ceil(how.dfYOff + how.dfYSize)) - y, 1, l.height - y);
   if (how.dfXSize < side) how.eResampleAlg = GRIORA_Bilinear;
   std::vector<float> out(std::size_t(side) * std::size_t(side));
-  const Stopwatch watch;
   const GDALDatasetUniquePtr file = open_level(path_, level, std::max(width, height) > kFewBlocks);
+  const Stopwatch watch;
   check(file->GetRasterBand(1)->RasterIO(GF_Read, x, y, width, height, out.data(), side, side, GDT_Float32, 0,
                                          0, &how),
         path_);

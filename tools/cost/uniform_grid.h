@@ -26,7 +26,8 @@ class UniformGrid {
   bool complete() const { return complete_; }  ///< level 0 has the finest step of all grids
   ErrorFigures error(int level, std::span<const double> scale) const;
   /// Milliseconds for side x side heights over `window` (metres) from this level of the file: bilinear, but
-  /// the nearest samples where it has more of them; decoded on all cores, the file opened anew each time.
+  /// the nearest samples where it has more of them; decoded on all cores. The file is open, as a database is,
+  /// and none of its blocks in memory.
   double read(int level, const Extent& window, int side) const;
 
  private:

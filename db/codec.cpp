@@ -3,6 +3,7 @@
 #include <cassert>
 
 #include "db/differences.h"
+#include "db/little_endian.h"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -89,7 +90,7 @@ void restore_rows(std::int32_t* codes, std::size_t cols, std::size_t rows, std::
 
 void encode_alone(std::span<const std::int32_t> codes, std::size_t cols, std::size_t rows,
                   std::vector<std::byte>& out) {
-  for (int i = 0; i < 4; ++i) out.push_back(std::byte(std::uint32_t(codes[0]) >> 8 * i));
+  put_little(out, codes[0]);
   thread_local std::vector<std::int32_t> differences;
   differences.resize(codes.size());
   const std::vector<std::int32_t> base_row(cols, codes[0]);
@@ -112,11 +113,10 @@ void encode_with_parent(std::span<const std::int32_t> codes, int cols, int rows,
 std::string decode_alone(std::span<const std::byte>& bytes, std::size_t cols, std::size_t rows,
                          std::span<std::int32_t> out) {
   if (bytes.size() < 4) return "codes: cut short";
-  std::uint32_t base = 0;
-  for (int i = 0; i < 4; ++i) base |= std::uint32_t(bytes[std::size_t(i)]) << 8 * i;
+  const auto base = get_little<std::int32_t>(bytes.data());
   bytes = bytes.subspan(4);
   if (std::string bad = take_differences(bytes, out); !bad.empty()) return bad;
-  restore_rows(out.data(), cols, rows, std::int32_t(base));
+  restore_rows(out.data(), cols, rows, base);
   return {};
 }
 

@@ -2,6 +2,7 @@
 #include <string>
 
 #include "db/error.h"
+#include "db/little_endian.h"
 #include "db/lod_tree.h"
 
 // The header, format 2, all little-endian: u32 format, u32 root page, u32 height, u64 entries, u32 pages
@@ -11,19 +12,9 @@ namespace patchwork {
 
 namespace {
 
-constexpr std::uint64_t kFormat = 2;
+constexpr std::uint32_t kFormat = 2;
 constexpr std::size_t kHeaderBytes = 24;
 constexpr std::size_t kMostPages = std::size_t{1} << 24;  // 10^9 boxes; what a hostile header may ask for
-
-void put(std::vector<std::byte>& out, std::uint64_t value, int bytes) {
-  for (int i = 0; i < bytes; ++i) out.push_back(std::byte(value >> 8 * i));
-}
-
-std::uint64_t get(std::span<const std::byte> from, std::size_t at, std::size_t bytes) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < bytes; ++i) value |= std::uint64_t(from[at + i]) << 8 * i;
-  return value;
-}
 
 std::string name(std::uint32_t page) { return "page " + std::to_string(page); }
 
@@ -35,27 +26,28 @@ void LodTree::refuse(const std::string& problem) {
 
 std::vector<std::byte> LodTree::header_bytes() const {
   std::vector<std::byte> out;
-  put(out, kFormat, 4), put(out, root_, 4), put(out, pages_[root_].level + 1, 4), put(out, size_, 8);
-  put(out, pages_.size(), 4);
-  for (const std::uint32_t page : free_) put(out, page, 4);
+  put_little(out, kFormat), put_little(out, root_), put_little(out, pages_[root_].level + 1);
+  put_little(out, std::uint64_t{size_}), put_little(out, std::uint32_t(pages_.size()));
+  for (const std::uint32_t page : free_) put_little(out, page);
   return out;
 }
 
 LodTree LodTree::open(std::span<const std::byte> header, const ReadPage& read) {
-  if (header.size() < kHeaderBytes || header.size() % 4 || get(header, 0, 4) != kFormat)
+  const auto u32 = [&](std::size_t at) { return get_little<std::uint32_t>(header.data() + at); };
+  if (header.size() < kHeaderBytes || header.size() % 4 || u32(0) != kFormat)
     refuse("its header has an unknown format");
   LodTree tree;
-  const std::size_t size = get(header, 20, 4), free = (header.size() - kHeaderBytes) / 4;
-  tree.root_ = std::uint32_t(get(header, 4, 4)), tree.size_ = std::size_t(get(header, 12, 8));
+  const std::size_t size = u32(20), free = (header.size() - kHeaderBytes) / 4;
+  tree.root_ = u32(4), tree.size_ = get_little<std::uint64_t>(header.data() + 12);
   if (free >= size || size > kMostPages || size > most_pages(size - free) || size - free > tree.size_ + 1)
     refuse("its header states an impossible size");
   if (tree.root_ >= size) refuse("the root is no page");
   tree.free_.clear();
   for (std::size_t at = kHeaderBytes; at < header.size(); at += 4) {
-    tree.free_.push_back(std::uint32_t(get(header, at, 4)));
+    tree.free_.push_back(u32(at));
     if (tree.free_.back() >= size) refuse("its header names a free page that is none");
   }
-  const auto height = std::uint32_t(get(header, 8, 4));
+  const std::uint32_t height = u32(8);
   tree.pages_ = LazyTable<LodPage>(size, [read, height, size](std::size_t index) {
     std::string problem;
     auto page = std::make_unique<LodPage>(LodPage::from_bytes(read(std::uint32_t(index)), problem));

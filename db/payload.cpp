@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "db/codec.h"
+#include "db/little_endian.h"
 
 namespace patchwork {
 
@@ -28,8 +29,11 @@ Chunk make_chunk(const GridShape& shape, int level, int cx, int cy) {
 std::vector<std::byte> encode_chunk(const Chunk& chunk, const Chunk* parent, int cx, int cy) {
   const std::optional<ParentCodes> above = parent_codes(parent, cx, cy);
   std::vector<std::byte> codes = encode_codes(chunk.codes, chunk.cols, chunk.rows, above ? &*above : nullptr);
-  std::vector<std::byte> out{kMagic, kVersion, std::byte(!chunk.cells.empty()), std::byte{0}};
-  for (int shift = 0; shift < 32; shift += 8) out.push_back(std::byte(codes.size() >> shift & 0xff));
+  std::vector<std::byte> out;
+  out.reserve(kHeader + codes.size());
+  for (const std::byte b : {kMagic, kVersion, std::byte(!chunk.cells.empty()), std::byte{0}})
+    out.push_back(b);
+  put_little(out, std::uint32_t(codes.size()));
   out.insert(out.end(), codes.begin(), codes.end());
   if (!chunk.cells.empty()) {
     const std::vector<std::int32_t> cells(chunk.cells.begin(), chunk.cells.end());
@@ -43,8 +47,7 @@ std::string decode_chunk(std::span<const std::byte> bytes, Chunk& chunk, const C
                          int cy) {
   if (bytes.size() < kHeader || bytes[0] != kMagic) return "not a payload chunk";
   if (bytes[1] != kVersion) return "a payload of an unknown version";
-  std::size_t length = 0;
-  for (int k = 0; k < 4; ++k) length |= std::size_t(bytes[size_t(4 + k)]) << (8 * k);
+  const std::size_t length = get_little<std::uint32_t>(bytes.data() + 4);
   if (length > bytes.size() - kHeader) return "a payload that ends early";
   const std::size_t n = size_t(chunk.cols) * size_t(chunk.rows);
   chunk.codes.resize(n), chunk.cells.clear();

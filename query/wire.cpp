@@ -1,14 +1,14 @@
 #include "query/wire.h"
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <utility>
 
 #include "db/codec.h"
 #include "db/error.h"
+#include "db/little_endian.h"
 #include "db/pack.h"
 
 // Format 1, all little-endian: u32 'PWU1', u32 length of the structure, the structure (packed), then one blob
@@ -46,8 +46,7 @@ class Writer {
  public:
   template <class T>
   void put(T value) {
-    const auto bits = std::bit_cast<std::array<std::byte, sizeof(T)>>(value);
-    bytes_.insert(bytes_.end(), bits.begin(), bits.end());
+    put_little(bytes_, value);
   }
   std::vector<std::byte> take() { return std::move(bytes_); }
 
@@ -60,10 +59,7 @@ class Reader {
   explicit Reader(std::span<const std::byte> bytes) : left_(bytes) {}
   template <class T>
   T get() {
-    std::array<std::byte, sizeof(T)> bits;
-    const auto from = take(sizeof(T));
-    std::copy(from.begin(), from.end(), bits.begin());
-    return std::bit_cast<T>(bits);
+    return get_little<T>(take(sizeof(T)).data());
   }
   double metres() {
     const auto value = get<double>();

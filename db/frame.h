@@ -67,9 +67,13 @@ struct LatticeRect {
 };
 
 /// Vertex (i, j) lies at (x0 + xi i + xj j, y0 + yi i + yj j), in exact arithmetic on the stored doubles
-/// (design: model, section 2). The axes are orthogonal; they may be rotated, mirrored and of different steps.
+/// (design: model, section 2). The axes are orthogonal, to a cosine of kMostShear; they may be rotated,
+/// mirrored and of different steps.
 class Frame {
  public:
+  /// Axes further from orthogonal than this (cosine) are shear, not the rounding of a printed rotation.
+  static constexpr double kMostShear = 1e-5;
+
   Frame() = default;
 
   /// From a GDAL geotransform (pixel corner); the frame's lattice is that of the pixel centres.
@@ -93,6 +97,7 @@ class Frame {
   double step_j() const;         ///< metres between (0,0) and (0,1)
   double finer_step() const;     ///< the smaller of the two
   double cell_area() const;      ///< square metres
+  double cosine() const;         ///< of the angle between the axes
   double angle_degrees() const;  ///< of the i axis against the domain's x axis
   /// The corners of a lattice rectangle in the domain, in turn: (i0, j0), (i1, j0), (i1, j1), (i0, j1).
   Corners corners(const LatticeRect& r) const {

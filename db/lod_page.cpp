@@ -8,7 +8,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "db/little_endian.h"
 #include "db/vectorized.h"
@@ -193,14 +192,10 @@ float error_octaves(float error) {
   return float(std::bit_cast<std::int32_t>(bounded)) * 0x1p-23f;
 }
 
-LodPage::LodPage(std::uint32_t page_level) {
-  std::memset(static_cast<void*>(this), 0, sizeof(*this)), level = page_level;
-}
-
 void LodPage::set_box(std::uint32_t s, const LodBox& b) {
   xmin[s] = b.xmin, ymin[s] = b.ymin, xmax[s] = b.xmax, ymax[s] = b.ymax;
   bottom[s] = b.bottom, top[s] = b.top;
-  if (count == 0) origin = {b.xmin, b.ymin};
+  if (count == 0) origin = {b.xmin, b.ymin}, reach = 0;
   const double w = b.xmin - origin.x, so = b.ymin - origin.y, e = b.xmax - origin.x, n = b.ymax - origin.y;
   west[s] = float_at_most(w), south[s] = float_at_most(so);
   east[s] = float_at_least(e), north[s] = float_at_least(n);

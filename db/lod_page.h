@@ -38,7 +38,8 @@ bool contains(const LodBox& outer, const LodBox& inner);
 float error_octaves(float error);
 
 /// What a cut makes of a page: bit s is set in `met` if box s can belong to the answer, in `inside` if it
-/// lies in the region as a whole, so that what is below it need not be asked where it lies.
+/// lies in the region as a whole, so that what is below it need not be asked where it lies; of a leaf, which
+/// has nothing below it, `inside` says nothing.
 struct LodHits {
   std::uint64_t met = 0, inside = 0;
 };
@@ -50,18 +51,17 @@ struct LodPage {
   static constexpr std::uint32_t kMinSlots = 24;  ///< of every page but the root
   static constexpr std::uint32_t kFree = 0xffff;  ///< the level of a page that is not in use
 
-  std::uint32_t level = kFree, count = 0;
+  std::uint32_t level, count = 0;
   /// A place near the boxes, from which floats give their sides in half the bytes: metres, rounded outward
   /// but for what the subtraction loses, 2^-53 of it. None is further away, along x or y, than `reach`.
   Point origin{};
   double reach = 0;
-  alignas(kLine) float bottom[kSlots];
-  float top[kSlots];
-  std::uint64_t ref[kSlots];
-  float west[kSlots], south[kSlots], east[kSlots], north[kSlots];
-  double xmin[kSlots], ymin[kSlots], xmax[kSlots], ymax[kSlots];
+  alignas(kLine) float bottom[kSlots] = {}, top[kSlots] = {};
+  std::uint64_t ref[kSlots] = {};
+  float west[kSlots] = {}, south[kSlots] = {}, east[kSlots] = {}, north[kSlots] = {};
+  double xmin[kSlots] = {}, ymin[kSlots] = {}, xmax[kSlots] = {}, ymax[kSlots] = {};
 
-  explicit LodPage(std::uint32_t page_level = kFree);
+  explicit LodPage(std::uint32_t page_level = kFree) : level(page_level) {}
   LodBox box(std::uint32_t s) const { return {xmin[s], ymin[s], xmax[s], ymax[s], bottom[s], top[s]}; }
   LodEntry entry(std::uint32_t s) const { return {box(s), {ref[s]}}; }
   std::uint32_t child(std::uint32_t s) const { return std::uint32_t(ref[s]); }
@@ -70,7 +70,7 @@ struct LodPage {
   void remove(std::uint32_t s);    ///< the last entry takes its place
   LodBox bounds() const;           ///< REQUIRES: count > 0
 
-  /// Asks memory for what every cut reads of a page, which lies at its beginning.
+  /// Asks memory for what every cut reads of a page: errors and ids, which lie at its beginning.
   void prefetch() const {
     for (std::size_t at = 0; at < offsetof(LodPage, west); at += kLine)
       __builtin_prefetch(reinterpret_cast<const char*>(this) + at);

@@ -104,9 +104,11 @@ GridInfo info_from(const nlohmann::json& f) {
   g.code_origin = f.at("code_origin"), g.quantisation = f.at("quantisation"), g.rim_error = f.at("rim_error");
   g.holes = f.at("holes"), g.sample_type = f.at("sample_type"), g.sample_bytes = f.at("sample_bytes");
   g.raw_scale = f.at("raw_scale"), g.lowest = f.at("lowest"), g.highest = f.at("highest");
-  // Files of earlier versions do not say it: no surface through samples stands further beyond their range.
+  // Files of earlier versions do not say it: no surface through samples, as they are stored, stands further
+  // beyond their range.
   constexpr double kMostOvershoot = 2.1;
-  g.overshoot = f.value("overshoot", kMostOvershoot * (g.highest - g.lowest));
+  const double q = g.quantisation, most = kMostOvershoot * (g.highest - g.lowest + 2 * q) + q;
+  g.overshoot = f.value("overshoot", most);
   if (!f.at("nodata").is_null()) g.nodata = f.at("nodata").get<double>();
   return g;
 }

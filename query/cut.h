@@ -46,7 +46,8 @@ struct ViewCut {
   int width = 1280, height = 720;  ///< pixels
   double pixel_error = 1;          ///< pixels
   double far = 0;                  ///< metres along the line of sight; REQUIRES: > 0
-  double lowest = 0, highest = 0;  ///< of the terrain, metres
+  double lowest = 0,
+         highest = 0;  ///< of the best terrain, metres; the others are beyond by their errors alone
   /// The distance in space instead, to the nearest height in [lowest, highest]: fewer patches for an eye high
   /// above, and the error is still seen under at most `pixel_error`, because no terrain is nearer than that.
   bool in_space = false;
@@ -73,8 +74,8 @@ struct FieldCut {
   bool strict = false;
 };
 
-/// Throw Error: a number that is none or negative, a view without extent, a line of less than two points, a
-/// field that is not width x height.
+/// Throw Error: a number that is none or negative, a view without extent or of more than 1e100 metres, a line
+/// of less than two points, a field that is not width x height.
 std::unique_ptr<CutSurface> make_surface(const UniformCut& cut);
 std::unique_ptr<CutSurface> make_surface(const ViewCut& cut);
 std::unique_ptr<CutSurface> make_surface(const CorridorCut& cut);

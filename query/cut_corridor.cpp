@@ -1,8 +1,8 @@
 // The corridor: a polyline that needs more accuracy than its surroundings.
 #include <algorithm>
-#include <boost/function_output_iterator.hpp>
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
+#include <boost/iterator/function_output_iterator.hpp>
 #include <cmath>
 #include <limits>
 
@@ -112,8 +112,8 @@ class CorridorSurface : public RangedSurface {
       const Distances d = distances(r, a, b);
       all = {std::min(all.least, d.least), std::min(all.most, d.most)};
     });
-    const double slack = this->slack(place, hair);
-    const double a = tolerance(all.least - slack), b = tolerance(all.most + slack);
+    const double lost = slack(place, hair);
+    const double a = tolerance(all.least - lost), b = tolerance(all.most + lost);
     return {std::min(a, b), std::max(a, b)};
   }
   CorridorCut cut_;

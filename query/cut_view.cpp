@@ -19,10 +19,14 @@ Vector cross(const Vector& a, const Vector& b) {
 }
 Vector normalised(const Vector& a) { return (1 / std::hypot(a[0], a[1], a[2])) * a; }
 
-// Andrew's monotone chain (1979).
+// Andrew's monotone chain (1979). Each point is a corner at most once of the lower chain, once of the upper.
 std::vector<Point> convex_hull(std::vector<Point> points) {
   std::sort(points.begin(), points.end(),
             [](const Point& a, const Point& b) { return a.x != b.x ? a.x < b.x : a.y < b.y; });
+  points.erase(std::unique(points.begin(), points.end(),
+                           [](const Point& a, const Point& b) { return a.x == b.x && a.y == b.y; }),
+               points.end());
+  if (points.size() < 3) return {};
   std::vector<Point> hull;
   const auto add = [&](const Point& p, std::size_t least) {
     while (hull.size() >= least + 2 && turn(hull[hull.size() - 2], hull.back(), p) <= 0) hull.pop_back();
@@ -50,14 +54,17 @@ class ViewSurface : public CutSurface {
     return view_.slope * std::hypot(p.x - view_.eye.x, p.y - view_.eye.y, view_.above);
   }
 
-  // The frame's axes are orthogonal, so the nearest point of a rectangle is found axis by axis.
+  // Axis by axis, as if they were orthogonal: where they are not quite, a squared length is that of its parts
+  // but for their cosine's share, at most.
   ToleranceRange over(const Frame& frame, const LatticeRect& r) const override {
     const Point e = frame.to_lattice(view_.eye.x, view_.eye.y);
-    const double i = frame.step_i(), j = frame.step_j();
+    const double i = frame.step_i(), j = frame.step_j(), shear = std::abs(frame.cosine());
+    const double least = std::sqrt(1 - shear), most = std::sqrt(1 + shear);
     const auto near = [](double v, double a, double b) { return std::max({a - v, v - b, 0.0}); };
     const auto far = [](double v, double a, double b) { return std::max(std::abs(a - v), std::abs(b - v)); };
-    return {view_.slope * std::hypot(i * near(e.x, r.i0, r.i1), j * near(e.y, r.j0, r.j1), view_.above),
-            view_.slope * std::hypot(i * far(e.x, r.i0, r.i1), j * far(e.y, r.j0, r.j1), view_.above)};
+    const auto tolerance = [&](double x, double y) { return view_.slope * std::hypot(x, y, view_.above); };
+    return {tolerance(least * i * near(e.x, r.i0, r.i1), least * j * near(e.y, r.j0, r.j1)),
+            tolerance(most * i * far(e.x, r.i0, r.i1), most * j * far(e.y, r.j0, r.j1))};
   }
 
   // Two convex sets are apart if a side of one of them parts them.
@@ -107,7 +114,7 @@ std::vector<Point> footprint(const ViewCut& v) {
       }
   };
   for (int k = 0; k < 4; ++k) clip(eye, corners[k]), clip(corners[k], corners[(k + 1) % 4]);
-  return points.size() < 3 ? std::vector<Point>() : convex_hull(std::move(points));
+  return convex_hull(std::move(points));
 }
 
 ViewCut over_terrain_of(const Database& db, ViewCut v) {
@@ -124,14 +131,17 @@ ViewCut over_terrain_of(const Database& db, ViewCut v) {
 }
 
 std::unique_ptr<CutSurface> make_surface(const ViewCut& v) {
-  for (const double n : {v.eye.x, v.eye.y, v.eye.z, v.look.x, v.look.y, v.look.z, v.lowest, v.highest})
-    require(std::isfinite(n), "view", "eye, look and heights must be numbers");
-  require(std::hypot(v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z) > 0, "view",
+  // So that neither areas nor their reciprocals overflow.
+  constexpr double kMost = 1e100, kLeast = 1 / kMost;
+  for (const double n : {v.eye.x, v.eye.y, v.eye.z, v.look.x, v.look.y, v.look.z, v.lowest, v.highest, v.far})
+    require(std::abs(n) <= kMost, "view", "eye, look, far and heights must be metres, up to 1e100");
+  require(std::hypot(v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z) >= kLeast, "view",
           "eye and look are the same point");
   require(v.fov_degrees > 0 && v.fov_degrees < 180, "fov", "it must be between 0 and 180 degrees");
   require(v.width > 0 && v.height > 0, "size", "width and height must be pixels, at least 1");
-  require(is_error(v.pixel_error), "pixel-error", "it must be a number of pixels, 0 or more");
-  require(v.far > 0 && std::isfinite(v.far) && v.lowest <= v.highest, "view", "it has no extent");
+  require(v.pixel_error >= 0 && v.pixel_error <= kMost, "pixel-error",
+          "it must be a number of pixels, 0 to 1e100");
+  require(v.far > 0 && v.lowest <= v.highest, "view", "it has no extent");
   return std::make_unique<ViewSurface>(v);
 }
 

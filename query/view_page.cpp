@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <stdexcept>
 #include <type_traits>
 
 // Compiled once for every instruction set that Highway knows of this kind of machine; the best is used.
@@ -20,8 +20,10 @@ namespace patchwork {
 namespace {
 
 // What a page's floats are compared with, metres from its origin: wide enough for what floats lose, so that
-// no box is missed. Lengths by kLoss of all that they were made from, squares by kHair.
-constexpr double kLoss = 0x1p-21, kHair = 0x1p-19;
+// no box is missed. Lengths by kLoss of all that they were made from, tolerances a metre by kHair, which also
+// covers what a frame's shear adds to a patch's range.
+constexpr double kLoss = 0x1p-21, kHair = 0x1p-16;
+static_assert(kHair - 0x1p-19 >= Frame::kMostShear);
 // Tolerances a metre of distance, and distances, whose squares stay floats; kNothing is what may vanish
 // there.
 constexpr double kLeast = 1e-15, kMost = 1e18;
@@ -44,7 +46,7 @@ using Coordinates = hn::CappedTag<double, 8>;
 
 std::uint64_t bits_of(Slots d, hn::Mask<Slots> mask) {
   using Bits = std::conditional_t<(hn::MaxLanes(Slots()) > 8), std::uint16_t, std::uint8_t>;
-  std::uint8_t bytes[8];
+  std::uint8_t bytes[8] = {};
   hn::StoreMaskBits(d, mask, bytes);
   Bits bits;
   std::memcpy(&bits, bytes, sizeof(bits));
@@ -55,8 +57,8 @@ std::uint64_t bits_of(Slots d, hn::Mask<Slots> mask) {
 std::uint64_t near_enough(const LodPage& page, const PageView& v, float loss) {
   const Slots d;
   const Point& o = page.origin;
-  const auto less = [&](double a) { return hn::Set(d, float(a) - loss); };
-  const auto more = [&](double a) { return hn::Set(d, float(a) + loss); };
+  const auto less = [&](double a) HWY_ATTR { return hn::Set(d, float(a) - loss); };
+  const auto more = [&](double a) HWY_ATTR { return hn::Set(d, float(a) + loss); };
   const auto x_low = less(v.eye.x - o.x), x_high = more(v.eye.x - o.x), y_low = less(v.eye.y - o.y),
              y_high = more(v.eye.y - o.y);
   const auto bounds_west = less(v.bounds.xmin - o.x), bounds_east = more(v.bounds.xmax - o.x),
@@ -148,7 +150,7 @@ PageView::PageView(Point from, double height, double metres_a_metre)
 }
 
 void PageView::add_side(Point a, Point b) {
-  assert(sides < kMostSides);
+  if (sides == kMostSides) throw std::length_error("a view's region has too many sides");
   const double length = std::hypot(b.x - a.x, b.y - a.y);
   const double x = (b.y - a.y) / length, y = (a.x - b.x) / length;  // outward
   nx[sides] = x, ny[sides] = y, most[sides] = std::max(x * a.x + y * a.y, x * b.x + y * b.y);

@@ -11,10 +11,12 @@ namespace patchwork {
 /// A view as a question to pages: the squared tolerance is slope^2 times the squared distance to an eye, over
 /// a convex region.
 struct PageView {
-  static constexpr std::size_t kMostSides = 24;  ///< a pyramid's edges between two planes have fewer ends
+  /// A pyramid between two planes has at most 21 corners: 5 ends of its edges, and 8 edges that cross both.
+  /// Rounded, and all nearly on one line, each may be a corner of either side of their hull.
+  static constexpr std::size_t kMostSides = 40;
 
   PageView(Point eye, double above, double slope);
-  /// A side of the region, counterclockwise. REQUIRES: a != b; fewer than kMostSides are there.
+  /// A side of the region, counterclockwise. REQUIRES: a != b. Throws std::length_error beyond kMostSides.
   void add_side(Point a, Point b);
   bool beyond(std::size_t side, Point p) const { return nx[side] * p.x + ny[side] * p.y > most[side]; }
 
@@ -24,7 +26,7 @@ struct PageView {
 
   Point eye;
   double above, slope;  ///< metres from the eye to the plane; metres of tolerance a metre of distance
-  float k_near, k_far, height2;       ///< a little less than slope^2, a little more; above^2
+  float k_near, k_far, height2;       ///< slope^2, less a little and more a little; above^2
   Extent bounds = Extent::nothing();  ///< of the region
   double reach = 0;                   ///< metres from the eye to the furthest corner, along x and y together
   /// Inside are the points with nx x + ny y <= most; |(nx, ny)| = 1. Those behind `sides` hold every point.

@@ -9,9 +9,11 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <random>
 
+#include "db/codec.h"
 #include "tests/db/database_files.h"
 #include "tests/db/databases.h"
 #include "tests/grids.h"
@@ -421,6 +423,45 @@ TEST(Database, DamageIsReportedWithTheNameOfTheFile) {
   EXPECT_TRUE(says(damaged("DELETE FROM payload WHERE rowid = (SELECT max(id) FROM payload)"), "missing"));
   EXPECT_TRUE(says(damaged("DELETE FROM records"), "missing"));
   EXPECT_NE(damaged("DROP TABLE payload"), "");
+}
+
+// --- Files of earlier versions.
+
+// The record of the only grid without one of its facts.
+void forget(const std::string& path, const std::string& fact) {
+  sqlite3* raw = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &raw), SQLITE_OK);
+  const std::unique_ptr<sqlite3, int (*)(sqlite3*)> closed(raw, sqlite3_close);
+  sqlite3_stmt* facts = nullptr;
+  ASSERT_EQ(sqlite3_prepare_v2(raw, "SELECT facts FROM grid", -1, &facts, nullptr), SQLITE_OK);
+  ASSERT_EQ(sqlite3_step(facts), SQLITE_ROW);
+  const auto* bytes = static_cast<const std::uint8_t*>(sqlite3_column_blob(facts, 0));
+  nlohmann::json record = nlohmann::json::from_cbor(bytes, bytes + sqlite3_column_bytes(facts, 0));
+  sqlite3_finalize(facts);
+  ASSERT_EQ(record.erase(fact), 1u);
+  const std::vector<std::uint8_t> cbor = nlohmann::json::to_cbor(record);
+  std::string hex;
+  for (const std::uint8_t byte : cbor) hex += fmt::format("{:02x}", byte);
+  execute(path, fmt::format("UPDATE grid SET facts = x'{}', checksum = {}", hex,
+                            std::int64_t(checksum(std::as_bytes(std::span(cbor))))));
+}
+
+// They do not say how far a surface stands beyond its samples; what is assumed must hold it, which of a flat
+// lake is what storing it lost.
+TEST(Database, AFileThatDoesNotSayHowFarItsSurfaceStandsBeyondIsGivenEnough) {
+  for (const double waves : {0.01, 30.0}) {
+    const GridFolder folder;
+    Database written = folder.database();
+    const auto lake = [&](int i, int j) { return (i / 2 + j / 2) % 2 ? waves : -waves; };
+    folder.add(written, {.at = lake}, "lake", {.tolerance = 0.5});
+    const GridInfo said = written.grids()[0].info;
+    ASSERT_GE(said.overshoot, said.quantisation);
+    forget(written.path(), "overshoot");
+    const Database earlier = Database::open(written.path());
+    const GridInfo assumed = earlier.grids()[0].info;
+    EXPECT_GE(assumed.overshoot, said.overshoot);
+    EXPECT_LE(assumed.overshoot, 2.2 * (2 * waves + 4 * said.quantisation));
+  }
 }
 
 // --- Files that come and go, and CRSs.

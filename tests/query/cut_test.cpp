@@ -13,6 +13,7 @@
 #include <set>
 
 #include "query/extract.h"
+#include "query/view_page.h"
 #include "tests/db/databases.h"
 #include "tests/grids.h"
 #include "tests/seed.h"
@@ -63,6 +64,14 @@ class Random {
  private:
   std::mt19937_64 random_;
 };
+
+// Axes whose angle has this cosine.
+Frame sheared(Random& random, double cosine) {
+  const double angle = random.uniform(0, 7), other = angle + std::acos(cosine), i = random.uniform(1, 20),
+               j = random.uniform(1, 20);
+  return Frame::from_trusted({random.uniform(-2000, 2000), i * std::cos(angle), j * std::cos(other),
+                              random.uniform(-2000, 2000), i * std::sin(angle), j * std::sin(other)});
+}
 
 std::unique_ptr<CutSurface> any_cut(Random& random, double side, int kind) {
   if (kind == 0) return make_surface(random.uniform_cut(side));
@@ -179,6 +188,76 @@ TEST(ViewCutsOfPages, MissNoBoxWhateverTheNumbersAndTheInstructions) {
   EXPECT_LE(double(spare), 0.25 * double(found) + 100) << "and few that it does not meet";
 }
 
+// Import takes frames whose axes are a hair from orthogonal. Boxes that a patch's range barely meets tell
+// whether what the page compares holds that range.
+TEST(ViewCutsOfPages, MissNoPatchOfAShearedFrame) {
+  Random random(test_seed(22));
+  std::size_t met = 0, beyond = 0;
+  for (int n = 0; n < 3000; ++n) {
+    Grid grid;
+    const Frame& f = grid.info.frame = sheared(random, n % 3 ? Frame::kMostShear : -Frame::kMostShear);
+    grid.info.shape = GridShape(21, 21, false);
+    // From far away along a diagonal of its cells, where shear changes distances most.
+    const double away = std::exp2(random.uniform(8, 20)), i = away / f.step_i(), j = away / f.step_j();
+    const Point eye = f.to_domain(10 - i, n % 2 ? 10 - j : 10 + j), look = f.to_domain(10, 10);
+    ViewCut v = random.view(3000);
+    v.eye = {eye.x, eye.y, 100}, v.look = {look.x, look.y, 0}, v.far = 1.6 * away;
+    const auto cut = make_surface(v);
+    const LatticeRect domain = grid.info.shape.domain(0, 0, 0);
+    const ToleranceRange r = cut->over(grid.info.frame, domain);
+    const Extent e = grid.info.frame.bounds(domain);
+    if (!cut->meets(grid, {0, 0, 0}) || r.low == 0) continue;
+    LodPage page(0);
+    const auto add = [&](float bottom, float top) {
+      page.append({{e.xmin, e.ymin, e.xmax, e.ymax, bottom, top}, {page.count}});
+    };
+    add(float_at_most(r.high), INFINITY), add(0, std::nextafter(float_at_least(r.low), INFINITY));
+    add(float(r.high * 1.01), INFINITY), add(0, float(r.low * 0.99));
+    const std::uint64_t hits = cut->hits(page, false).met;
+    ASSERT_EQ(hits & 3, 3u) << n;
+    ++met, beyond += (hits & 12) == 0;
+  }
+  EXPECT_GT(met, 300u);
+  EXPECT_GT(beyond, met / 10) << "and it holds little more";
+}
+
+// What a view sees has few corners however its numbers round, and one beyond all lengths is refused.
+TEST(ViewCutsOfPages, TakeViewsOfAnySize) {
+  Random random(test_seed(23));
+  LodPage page(0);
+  for (std::uint64_t k = 0; k < LodPage::kSlots; ++k) page.append(random_box(random, k));
+  std::size_t most = 0, regions = 0;
+  for (int n = 0; n < 20000; ++n) {
+    ViewCut v = random.view(3000);
+    const auto scale = [&] { return std::exp2(random.uniform(-300, 330)); };
+    const double size = n % 2 ? scale() : 1;
+    for (double* c : {&v.eye.x, &v.eye.y, &v.eye.z, &v.look.x, &v.look.y, &v.look.z, &v.lowest, &v.highest})
+      *c = std::clamp(*c * (n % 4 == 3 ? scale() : size), -1e100, 1e100);
+    v.far = std::min(v.far * size, 1e100);
+    if (v.lowest > v.highest) std::swap(v.lowest, v.highest);
+    if (n % 5 == 0) v.lowest = v.highest;
+    if (n % 7 == 0) v.fov_degrees = std::nextafter(180.0, 0.0);
+    if (n % 11 == 0)
+      v.eye.x = v.look.x, v.eye.y = v.look.y, v.look.z = v.eye.z - std::copysign(1e-9 * v.far, v.eye.z);
+    if (std::hypot(v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z) < 1e-99) continue;
+    const std::vector<Point> corners = footprint(v);
+    for (const Point& p : corners) ASSERT_TRUE(std::isfinite(p.x) && std::isfinite(p.y)) << n;
+    most = std::max(most, corners.size()), regions += corners.size() >= 3;
+    make_surface(v)->hits(page, false);
+  }
+  EXPECT_GT(regions, 5000u);
+  EXPECT_LE(most, PageView::kMostSides);
+  EXPECT_NE(refusal_of([] {
+              make_surface(ViewCut{.eye = {1, 0, 1.7e308},
+                                   .look = {1.2178443318775637e307, 0, 8.500000000000001e306},
+                                   .fov_degrees = 100,
+                                   .far = 8.5e307,
+                                   .lowest = -1.7e308,
+                                   .highest = 1.7e308});
+            }),
+            "");
+}
+
 // --- Extractions of a database.
 
 double rough(double x, double y) {
@@ -241,10 +320,7 @@ TEST_F(CutTest, RangesHoldEveryToleranceInside) {
   int narrow = 0;
   for (int n = 0; n < 2000; ++n) {
     const auto cut = any_cut(random, 2000, 1 + n % 3);
-    const double angle = random.uniform(0, 7), step = random.uniform(1, 20);
-    const Frame frame =
-        Frame::from_trusted({random.uniform(-2000, 2000), step * std::cos(angle), -step * std::sin(angle),
-                             random.uniform(-2000, 2000), step * std::sin(angle), step * std::cos(angle)});
+    const Frame frame = sheared(random, n % 8 == 0 ? Frame::kMostShear : 0);
     const LatticeRect rect{-3, 2, random.uniform(0, 40), random.uniform(3, 40)};
     const ToleranceRange r = cut->over(frame, rect);
     double low = INFINITY, high = 0;
@@ -473,6 +549,11 @@ TEST_F(CutTest, WhatIsNoCutIsRefused) {
   EXPECT_NE(refused([](ViewCut& c) { c.pixel_error = -1; }), "");
   EXPECT_NE(refused([](ViewCut& c) { c.eye.x = NAN; }), "");
   EXPECT_NE(refused([](ViewCut& c) { c.far = 0; }), "");
+  EXPECT_NE(refused([](ViewCut& c) { c.far = 1e101; }), "");
+  EXPECT_NE(refused([](ViewCut& c) {
+              c.look = {0, 0, std::nextafter(10.0, 11)}, c.pixel_error = 1e101;
+            }),
+            "");
   EXPECT_NE(refusal_of([] { make_surface(CorridorCut{.line = {{0, 0}}}); }), "");
   EXPECT_NE(refusal_of([] { make_surface(CorridorCut{.line = {{0, 0}, {1, 1}}, .ramp = -1}); }), "");
   EXPECT_EQ(refusal_of([] { make_surface(FieldCut{.width = 1, .height = 1, .tolerance = {2}}); }), "");

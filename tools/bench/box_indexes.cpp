@@ -31,8 +31,9 @@ struct EightSides {
   double nx_up[kSides] = {}, nx_down[kSides] = {}, ny_up[kSides] = {}, ny_down[kSides] = {}, most[kSides];
 
   explicit EightSides(const std::vector<Point>& corners) {
+    if (corners.size() > kSides) throw Error("bench query", "a view has more than eight corners");
     std::fill_n(most, kSides, INFINITY);
-    for (std::size_t k = 0; k < std::min(corners.size(), kSides); ++k) {
+    for (std::size_t k = 0; k < corners.size(); ++k) {
       const Point &a = corners[k], &b = corners[(k + 1) % corners.size()];
       const double nx = b.y - a.y, ny = a.x - b.x;
       nx_up[k] = std::max(nx, 0.0), nx_down[k] = std::min(nx, 0.0);

@@ -36,11 +36,8 @@ constexpr Section kSections[] = {
      "Time is that of finding the patches, reading them from the file and evaluating the picture."},
     {"stages", "Where the time goes",
      "The same steps in order, stage by stage; database and GeoTIFF are open, with nothing in memory but "
-     "what "
-     "the operating system keeps of their files. The uniform grid stands beside each step with its coarsest "
-     "level that is as close to the "
-     "best; "
-     "where it is missing, none is."},
+     "what the operating system keeps of their files. The uniform grid stands beside each step with its "
+     "coarsest level that is as close to the best; where it is missing, none is."},
     {"shares", "Where the time goes, as parts", "The same, each step by itself."},
     {"errors", "Asked for, guaranteed, measured",
      "The guarantee counts each grid's own accuracy; the measured error is the distance to the best answer "

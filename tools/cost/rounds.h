@@ -13,24 +13,25 @@ struct Stages {
   std::vector<double> query, fetch, blend, tessellate, draw, light;
   std::vector<double> total() const;    ///< of each run
   std::vector<double> at_hand() const;  ///< of each run, without fetch: patches are in memory
+  void add(const Stages& runs);
 };
 
 /// A run of something: adds its times.
 using MeasuredRun = std::function<void(Stages&)>;
 
 struct Rounds {
-  int least;                                    ///< measured rounds
+  int least;                                    ///< visits of each
   std::chrono::steady_clock::time_point until;  ///< up to which there may be more
   std::function<void(double)> progress;         ///< told the share that is done
 };
 
-/// Runs each in turn, A B C A B C: `least` times, and on until what counts of each is known to kSure of
-/// itself, the time has come, or kMostRuns were made. Of each, the middle half of its runs counts and is
-/// given out, three at least: a machine that others use too has faster and slower minutes, which all settings
-/// meet alike. So medians keep to each other's proportions, where what was fastest depends on who met the
-/// best moment.
+/// Visits each `least` times, and on until what counts of each is known to kSure of itself or the time has
+/// come. What takes longer is visited less often, by the root of its time, as makes the most of the time for
+/// all medians (Neyman 1934); and in another order each time, so that a slower moment of the machine is not
+/// always that of the same neighbours. Of each, the middle half of its runs counts and is given out, three at
+/// least: a machine that others use too has faster and slower minutes, which all settings meet alike. So
+/// medians keep to each other's proportions, where what was fastest depends on who met the best moment.
 std::vector<Stages> measure(std::span<const MeasuredRun> all, const Rounds& rounds);
 inline constexpr double kSure = 0.02;  ///< between the fastest and the slowest that count
-inline constexpr int kMostRuns = 100;
 
 }  // namespace patchwork::cli

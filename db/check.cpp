@@ -27,10 +27,7 @@ class Checker {
   Checker(Database::Impl& db, const Progress& progress) : db_(db), progress_(progress) {}
 
   std::vector<Problem> run() {
-    for (const std::string& damage : db_.store->find_damage()) problems_.push_back({damage, "file"});
-    for (const Store::Kind kind : kOfGrids)
-      if (const std::size_t n = strays(db_, kind).size())
-        problems_.push_back({fmt::format("{} blobs belong to no grid", n), "file"});
+    check_store();
     for (const Grid& g : db_.grids) check_records(g);
     check_payloads();
     if (records_sound_) check_standings();
@@ -66,6 +63,14 @@ class Checker {
   }
   static std::string place_of(const GridInfo& g, int level, int x, int y) {
     return fmt::format("grid {}, level {}, {}, {}", g.name, level, x, y);
+  }
+
+  void check_store() {
+    const std::lock_guard lock(db_.store_mutex);
+    for (const std::string& damage : db_.store->find_damage()) problems_.push_back({damage, "file"});
+    for (const Store::Kind kind : kOfGrids)
+      if (const std::size_t n = strays(db_, kind).size())
+        problems_.push_back({fmt::format("{} blobs belong to no grid", n), "file"});
   }
 
   void check_records(const Grid& g) {
@@ -142,6 +147,7 @@ class Checker {
       db_.tree.traverse([](const LodBox&) { return true; }, [&](const LodEntry& e) { there.push_back(e); });
       std::sort(there.begin(), there.end(), before), std::sort(expected.begin(), expected.end(), before);
       if (there != expected) return std::string("its boxes are not those of the patches");
+      const std::lock_guard lock(db_.store_mutex);
       const std::size_t stored = db_.store->keys(Store::Kind::tree_page, 1, std::uint64_t{1} << 32).size();
       return stored == db_.tree.shape().nodes || db_.grids.empty()
                  ? ""
@@ -179,7 +185,7 @@ RepairReport Database::repair(const Progress& progress) {
       report = {};
       return false;
     }
-    restate.store("repair", extent());
+    restate.store("repair");
     return report.done = true;
   });
   report.remaining = check(progress);

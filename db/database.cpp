@@ -4,7 +4,9 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <limits>
 
 #include "db/cell_masks.h"
 #include "db/database_impl.h"
@@ -26,6 +28,17 @@ constexpr const char* kRemark = "remark ";  // before the names of remarks among
 constexpr const char* kRestore =
     "see: patchwork check; restore the file from a copy, or import the grid again";
 constexpr const char* kRepair = "run: patchwork check --repair, which makes it from the patches";
+constexpr std::uint64_t kUnknown = std::numeric_limits<std::uint64_t>::max();  // a version that no store has
+
+// A number among a store's facts, 0 where it is not there.
+std::uint64_t number(Store& store, const std::string& fact) {
+  const std::string text = store.fact(fact).value_or("0");
+  std::uint64_t n = 0;
+  const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), n);
+  if (problem != std::errc() || end != text.data() + text.size())
+    throw Error(store.path(), "its fact " + fact + " is damaged: " + text, kRestore);
+  return n;
+}
 
 // The samples of one patch's window, gathered from the chunks of its level.
 class Window : public CellSource {
@@ -127,23 +140,35 @@ PatchRecords Database::Impl::stored_records(const GridInfo& grid) {
 }
 
 void Database::Impl::load() {
-  crs = store->fact("crs").value_or("");
-  const auto count = [&](const char* key) { return std::stoull(store->fact(key).value_or("0")); };
-  version = count("version");
-  counts = {count("decided_integer"), count("decided_interval"), count("decided_exact")};
-  std::vector<Grid> before = std::move(grids);
-  grids.clear(), runs_read = 0;
+  try {
+    read_state();
+  } catch (const Error& e) {  // what was read before is no state of the store any more
+    std::set<GridId> all;
+    for (const Grid& g : grids) all.insert(g.info.id);
+    forget_heights(all);
+    version = kUnknown, grids.clear(), tree = LodTree(), tree_damage = e;
+    throw;
+  }
+}
+
+void Database::Impl::read_state() {
+  const std::uint64_t there = number(*store, "version");
+  const CoverageCounts decided{number(*store, "decided_integer"), number(*store, "decided_interval"),
+                               number(*store, "decided_exact")};
+  std::string new_crs = store->fact("crs").value_or("");
+  std::vector<Grid> now;
   for (GridInfo& info : store->grids()) {
     PatchRecords records = stored_records(info);
-    grids.push_back({std::move(info), std::move(records)});
+    now.push_back({std::move(info), std::move(records)});
   }
   std::set<GridId> gone;  // their ids are given to other grids again
-  for (const Grid& old : before)
-    if (std::none_of(grids.begin(), grids.end(), [&](const Grid& g) {
+  for (const Grid& old : grids)
+    if (std::none_of(now.begin(), now.end(), [&](const Grid& g) {
           return g.info.id == old.info.id && g.info.digest == old.info.digest;
         }))
       gone.insert(old.info.id);
   forget_heights(gone);
+  version = there, counts = decided, crs = std::move(new_crs), grids = std::move(now), runs_read = 0;
   tree = LodTree(), tree_damage.reset();
   try {
     const auto header = store->blob(Store::Kind::tree_page, 0);
@@ -170,7 +195,7 @@ void Database::Impl::change(const std::function<bool()>& work) {
   const auto settle = [&](bool keep) {
     const std::uint64_t mine = version;
     store->begin_read();
-    if (!keep || std::stoull(store->fact("version").value_or("0")) != mine) load();
+    if (!keep || number(*store, "version") != mine) load();
   };
   try {
     store->begin_write();
@@ -281,7 +306,7 @@ bool Database::refresh() {
   const std::uint64_t before = impl_->version;
   store.rollback();
   store.begin_read();
-  if (std::stoull(store.fact("version").value_or("0")) == before) return false;
+  if (number(store, "version") == before) return false;
   impl_->load();
   return true;
 }
@@ -289,8 +314,9 @@ bool Database::refresh() {
 bool Database::is_newest() const {
   std::unique_ptr<Store>& watch = impl_->watch;
   if (!watch) watch = open_store(path(), StoreMode::read);
+  watch->rollback();  // of a question that failed
   watch->begin_read();
-  const std::uint64_t newest = std::stoull(watch->fact("version").value_or("0"));
+  const std::uint64_t newest = number(*watch, "version");
   watch->rollback();
   return newest == version();
 }
@@ -350,6 +376,7 @@ std::uint64_t Database::sample_bytes() const {
 }
 
 std::string Database::content_hash() const {
+  const Reading reading = this->reading();
   std::vector<const Grid*> order;
   for (const Grid& g : impl_->grids) order.push_back(&g);
   std::sort(order.begin(), order.end(),

@@ -18,8 +18,10 @@ struct Database::Impl {
   Impl(std::unique_ptr<Store> opened, std::size_t memory);
 
   /// Takes grids and tree as the store's current transaction has them; records and pages are read when asked
-  /// for. Cached heights stay where their grids do.
+  /// for. Cached heights stay where their grids do. Where it throws Error there is no grid, until it is
+  /// called again.
   void load();
+  void read_state();  ///< of load()
   void forget_heights(const std::set<GridId>& gone);
   /// Runs `work` in a write transaction that it ends with commit(), true, or rollback(), false; afterwards,
   /// whatever happens, this is a state of the store.

@@ -37,9 +37,13 @@ double Frame::angle_degrees() const { return std::atan2(n_[4], n_[1]) * 180 / st
 Extent Frame::bounds(const LatticeRect& r) const {
   Extent e = Extent::nothing();
   for (const Point p : corners(r)) e.add(p);
-  const double sx = 4e-16 * std::max(std::abs(e.xmin), std::abs(e.xmax));
-  const double sy = 4e-16 * std::max(std::abs(e.ymin), std::abs(e.ymax));
-  return {e.xmin - sx, e.ymin - sy, e.xmax + sx, e.ymax + sy};
+  // What is added may cancel: rounding goes by its parts.
+  const double i = std::max(std::abs(r.i0), std::abs(r.i1)), j = std::max(std::abs(r.j0), std::abs(r.j1));
+  const auto lost = [&](double from, double by_i, double by_j) {
+    return 0x1p-51 * (std::abs(from) + std::abs(by_i) * i + std::abs(by_j) * j);
+  };
+  const double x = lost(n_[0], n_[1], n_[2]), y = lost(n_[3], n_[4], n_[5]);
+  return {e.xmin - x, e.ymin - y, e.xmax + x, e.ymax + y};
 }
 
 }  // namespace patchwork

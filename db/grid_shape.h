@@ -23,7 +23,8 @@ inline constexpr int kChunkVertices = 4 * kKernelCells;  ///< side of a stored p
 class GridShape {
  public:
   static constexpr int kMostSamples = kKernelCells
-                                      << 21;  ///< along an axis: PatchId counts blocks in 21 bits
+                                      << 21;              ///< along an axis: PatchId counts blocks in 21 bits
+  static constexpr std::size_t kMostBlocks = 0x7fffffff;  ///< of all levels: index() counts in 31 bits
 
   GridShape() = default;
   /// REQUIRES: width, height >= 2.

@@ -317,8 +317,7 @@ class Importer {
     db_.store->update_grid(grid_.info);
     restate.add(std::move(grid_));
     report_.seconds.invariant += watch_.lap();
-    const Extent& there = report_.extent;
-    restate.store((options_.replace.empty() ? "import " : "replace ") + report_.name, there);
+    restate.store((options_.replace.empty() ? "import " : "replace ") + report_.name);
     report_.seconds.store += watch_.lap();
     const Restate::Effect& e = restate.effect();
     report_.patches = e.added, report_.dormant = e.dormant, report_.hidden = e.hidden,
@@ -340,8 +339,6 @@ class Importer {
   Rim rim_i_, rim_j_;
 };
 
-}  // namespace
-
 // The first grid brings the CRS.
 void settle_crs(Database::Impl& db, const RasterSource& source) {
   if (source.crs().empty() || source.crs() == db.crs) return;
@@ -352,6 +349,8 @@ void settle_crs(Database::Impl& db, const RasterSource& source) {
     throw Error(source.path(), "it was placed in another CRS than the database's", "import it again");
   }
 }
+
+}  // namespace
 
 ImportReport Database::import(const RasterSource& source, const ImportOptions& options) {
   const Stopwatch watch;
@@ -366,6 +365,9 @@ ImportReport Database::import(const RasterSource& source, const ImportOptions& o
         throw Error(source.path(), "the database has a grid named " + options.name + " already",
                     "give another with --name, or take its place with --replace " + options.name);
     report = Importer(*impl_, source, options).run();
+    if (!options.replace.empty() && !report.duplicate_of.empty() && report.duplicate_of != options.replace)
+      throw Error(source.path(), "the same grid is there as " + report.duplicate_of + " already",
+                  "take " + options.replace + " out instead: patchwork remove DB " + options.replace);
     committing = watch.seconds();
     if (options.progress) options.progress(1);
     return !options.dry_run && report.duplicate_of.empty();
@@ -384,7 +386,7 @@ RemoveReport Database::remove(const std::string& name) {
     report.extent = info.bounds();
     Restate restate(*impl_);
     restate.remove(place);
-    restate.store("remove " + name, report.extent);
+    restate.store("remove " + name);
     const Restate::Effect& e = restate.effect();
     report.patches = e.removed, report.woken = e.woken, report.raised = e.raised;
     return true;

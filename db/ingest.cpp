@@ -78,8 +78,6 @@ Ingest::Ingest(const RasterSource& source, std::size_t memory, double tolerance,
   if (!cells_.empty()) {
     fill_means();
     masks_ = CellMasks::from_cells(std::move(cells_), shape_);
-    if (masks_.at(shape_.levels() - 1, 0, 0) == 0 && shape_.levels() == 1 && shape_.width() == 2)
-      throw Error(source.path(), "it holds no cell with data at all four corners");
   } else {
     std::vector<double>().swap(means_);  // `means_ = {}` would keep the memory, as would clear()
   }

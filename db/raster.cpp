@@ -103,6 +103,9 @@ Facts finish(RawGrid raw, const RasterOptions& options, const std::string& datab
   if (std::max(raw.width, raw.height) > GridShape::kMostSamples)
     throw Error(raw.path, "is a grid of " + size_text(raw.width, raw.height) + " samples",
                 "a side has " + std::to_string(GridShape::kMostSamples) + " at most");
+  if (GridShape(raw.width, raw.height, true).blocks() > GridShape::kMostBlocks)
+    throw Error(raw.path, "is a grid of " + size_text(raw.width, raw.height) + " samples",
+                "cut it into parts, e.g. with gdal_translate -srcwin");
   raw.frame();  // a sheared or degenerate file is refused before its heights are read
   const auto target = raster_impl::domain_crs(raw, database_crs);
   Facts f = describe(raw);

@@ -68,6 +68,7 @@ std::vector<PatchPlace> Restate::places_near(const Extent& extent, std::size_t a
 
 void Restate::add(Grid grid) {
   const Extent extent = grid.info.bounds();
+  where_.add(extent);
   const double least = smallest_bottom(grid);
   const auto place = std::lower_bound(db_.grids.begin(), db_.grids.end(), grid.info.id,
                                       [](const Grid& g, GridId id) { return g.info.id < id; });
@@ -85,6 +86,7 @@ void Restate::add(Grid grid) {
 void Restate::remove(std::size_t place) {
   const Grid gone = std::move(db_.grids[place]);
   const Extent extent = gone.info.bounds();
+  where_.add(extent);
   double least = -std::numeric_limits<double>::infinity();
   try {
     gone.patches.each([&](std::size_t k, const PatchRecord& p) {
@@ -120,6 +122,7 @@ std::size_t Restate::everything() {
       if (p.exists()) places.push_back({g, k});
     });
   const std::size_t changed = evaluate(std::move(places), kNone);
+  for (const Grid& g : db_.grids) where_.add(g.info.bounds());
   forget_lists();
   db_.tree = LodTree::build(live_entries(db_.grids)), db_.tree_damage.reset();
   rebuilt_ = true;
@@ -149,12 +152,13 @@ std::size_t Restate::evaluate(std::vector<PatchPlace> places, std::size_t added)
     if (g == added)
       ++effect_.added, effect_.dormant += after.dormant();
     else
-      note(before, after);
+      note(before, after, lod_box(grid.info, index, after));
   }
   return changed;
 }
 
-void Restate::note(const PatchRecord& before, const PatchRecord& after) {
+void Restate::note(const PatchRecord& before, const PatchRecord& after, const LodBox& box) {
+  if (!before.dormant() || !after.dormant()) where_.add({box.xmin, box.ymin, box.xmax, box.ymax});
   effect_.lowered += after.top < before.top;
   effect_.raised += after.top > before.top;
   effect_.hidden += after.dormant() && !before.dormant();
@@ -181,7 +185,7 @@ void Restate::change_tree() {
 
 void Restate::forget_lists() { std::vector<LodEntry>().swap(out_), std::vector<LodEntry>().swap(in_); }
 
-void Restate::store(const std::string& what, const Extent& where) {
+void Restate::store(const std::string& what) {
   Store& store = *db_.store;
   for (Grid& g : db_.grids)
     for (const std::uint32_t run : g.patches.runs().take_changed())
@@ -196,7 +200,7 @@ void Restate::store(const std::string& what, const Extent& where) {
   store.set_fact("decided_interval", std::to_string(db_.counts.interval));
   store.set_fact("decided_exact", std::to_string(db_.counts.exact));
   store.set_fact("version", std::to_string(++db_.version));
-  store.note_change({db_.version, what, where});
+  store.note_change({db_.version, what, where_});
 }
 
 }  // namespace patchwork

@@ -27,13 +27,14 @@ class Restate {
   void remove(std::size_t place);
   /// Evaluates every patch and builds the R-tree from nothing; returns how many records changed.
   std::size_t everything();
-  /// Writes what changed, and the next version with a note of `what` changed where.
-  void store(const std::string& what, const Extent& where);
+  /// Writes what changed, and the next version with a note of `what` changed. Where: the grids that came or
+  /// went, and the patches of others whose tops or flags changed, which may lie partly beside these.
+  void store(const std::string& what);
 
  private:
   std::vector<PatchPlace> places_near(const Extent& extent, std::size_t all_of) const;
   std::size_t evaluate(std::vector<PatchPlace> places, std::size_t added);
-  void note(const PatchRecord& before, const PatchRecord& after);
+  void note(const PatchRecord& before, const PatchRecord& after, const LodBox& box);
   void change_tree();
   void forget_lists();
 
@@ -41,6 +42,7 @@ class Restate {
   Effect effect_;
   std::vector<LodEntry> out_, in_;  // of the R-tree
   bool rebuilt_ = false;
+  Extent where_ = Extent::nothing();
 };
 
 /// Entries of the R-tree as the records have them; room for `about` as many is made beforehand.

@@ -27,6 +27,7 @@ constexpr int kSchemaVersion = 2;
 constexpr int kBusyMilliseconds = 10000, kRetryMilliseconds = 5;
 constexpr std::uintmax_t kPageBytes = 4096;
 constexpr std::size_t kMostPacked = 1 << 24;  // bytes of a records or tree blob, unpacked
+constexpr std::size_t kMostFacts = 4096;      // bytes of a grid's facts, which take some 400
 
 constexpr const char* kSchema = R"(
   CREATE TABLE fact(key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -94,19 +95,21 @@ GridInfo info_from(const nlohmann::json& f) {
   if (std::min(width, height) < 2 || std::max(width, height) > GridShape::kMostSamples)
     throw std::invalid_argument("an impossible size");
   g.shape = GridShape(width, height, f.at("area"));
+  if (g.shape.blocks() > GridShape::kMostBlocks) throw std::invalid_argument("an impossible size");
   const auto frame = f.at("frame").get<std::array<double, 6>>();
   for (const double n : frame)
     if (!std::isfinite(n)) throw std::invalid_argument("an impossible frame");
   g.frame = Frame::from_trusted(frame);
-  if (!std::isfinite(g.frame.cell_area()) || !(g.frame.cell_area() > 0))
+  if (!std::isfinite(g.frame.cell_area()) || !(g.frame.cell_area() > 0) ||
+      !(std::abs(g.frame.cosine()) <= Frame::kMostShear))
     throw std::invalid_argument("an impossible frame");
   g.accuracy = f.at("accuracy"), g.quantum = f.at("quantum"), g.base = f.at("base");
   g.code_origin = f.at("code_origin"), g.quantisation = f.at("quantisation"), g.rim_error = f.at("rim_error");
   g.holes = f.at("holes"), g.sample_type = f.at("sample_type"), g.sample_bytes = f.at("sample_bytes");
   g.raw_scale = f.at("raw_scale"), g.lowest = f.at("lowest"), g.highest = f.at("highest");
-  // Files of earlier versions do not say it: no surface through samples, as they are stored, stands further
-  // beyond their range.
-  constexpr double kMostOvershoot = 2.1;
+  // Files of earlier versions do not say it. In ranges of the samples, as they are stored: one and a half
+  // beyond the rim, and what a smooth interpolant, whose weights sum up to 1.25^2, departs at most.
+  constexpr double kMostOvershoot = 3;
   const double q = g.quantisation, most = kMostOvershoot * (g.highest - g.lowest + 2 * q) + q;
   g.overshoot = f.value("overshoot", most);
   if (!f.at("nodata").is_null()) g.nodata = f.at("nodata").get<double>();
@@ -301,6 +304,8 @@ std::vector<GridInfo> SqliteStore::grids() {
     const Bytes facts = checked(s.blob(3), s.integer(4), what), digest = s.blob(2);
     GridInfo g;
     try {
+      if (facts.size() > kMostFacts) throw std::invalid_argument("it is too long");
+      if (s.integer(0) < 1 || s.integer(0) > GridId::kMost) throw std::invalid_argument("an impossible id");
       g = info_from(nlohmann::json::from_cbor(facts));
     } catch (const std::exception& e) {
       throw Error(path_, what + " is damaged: " + e.what(), advice_for(SQLITE_CORRUPT));

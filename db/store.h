@@ -17,7 +17,7 @@ namespace patchwork {
 
 using Bytes = std::vector<std::byte>;
 
-/// One committed change: which grid came or went, and where.
+/// One committed change: which grid came or went, and where answers changed.
 struct Change {
   std::uint64_t version = 0;  ///< of the database after it
   std::string what;           ///< "import NAME", "remove NAME", "repair"

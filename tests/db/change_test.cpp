@@ -60,6 +60,13 @@ class Trial {
   }
 
   void step() {
+    const std::map<std::pair<std::string, std::size_t>, LodBox> before = live_boxes();
+    const std::uint64_t version = db_->version();
+    change_one();
+    if (db_->version() != version) expect_told_where(before, version);
+  }
+
+  void change_one() {
     const auto kind = random_() % 8;
     const std::size_t k = random_() % sources_.size();
     if (kind == 0) {
@@ -122,6 +129,33 @@ class Trial {
     EXPECT_EQ(found, scanned);
   }
 
+  std::map<std::pair<std::string, std::size_t>, LodBox> live_boxes() const {
+    std::map<std::pair<std::string, std::size_t>, LodBox> all;
+    for (const Grid& g : db_->grids())
+      each_patch(g, [&](std::size_t k, auto) {
+        if (!g.patches[k].dormant()) all[{g.info.name, k}] = lod_box(g, k);
+      });
+    return all;
+  }
+
+  // What came, went or changed among the boxes lies where the change says that it was.
+  void expect_told_where(const std::map<std::pair<std::string, std::size_t>, LodBox>& before,
+                         std::uint64_t version) {
+    const std::vector<Change> changes = db_->changed_since(version);
+    ASSERT_EQ(changes.size(), 1u);
+    const Extent& told = changes[0].extent;
+    const auto now = live_boxes();
+    const auto expect_inside = [&](const auto& some, const auto& others) {
+      for (const auto& [key, box] : some) {
+        const auto other = others.find(key);
+        if (other != others.end() && other->second == box) continue;
+        EXPECT_TRUE(told.contains({box.xmin, box.ymin}) && told.contains({box.xmax, box.ymax}))
+            << changes[0].what << ": " << key.first << " " << key.second;
+      }
+    };
+    expect_inside(before, now), expect_inside(now, before);
+  }
+
   void watch_redundant() {
     std::set<std::pair<std::string, std::size_t>> now;
     for (const Grid& g : db_->grids())
@@ -179,6 +213,40 @@ TEST(Change, RandomInsertsRemovalsAndReopeningsAgreeWithTheModelAfterEveryStep) 
   report_law("InsertRemove", "random insertions, removals and reopenings", std::uint64_t(test_trials(400)));
   report_control("InsertRemove", "redundant patches dropped for good, that were needed again",
                  std::uint64_t(test_trials(400)), double(trial.needed_again()), 0, "patches");
+}
+
+// Two surveys that share a seam hide coarse patches that neither covers alone, on both sides of it.
+TEST(Change, TellsOfPatchesThatChangedBesideTheGrid) {
+  const GridFolder folder;
+  Database db = folder.database();
+  const auto survey = [](double west) {
+    return of_terrain(
+        {.width = 330, .height = 300, .geotransform = {west, 4, 0, 1200, 0, -4}, .accuracy = 0.1}, rough);
+  };
+  folder.add(
+      db,
+      of_terrain({.width = 90, .height = 60, .geotransform = {0, 20, 0, 1200, 0, -20}, .accuracy = 2}, rough),
+      "base");
+  folder.add(db, survey(-200), "west");
+  const std::uint64_t before = db.version();
+  std::set<std::size_t> live;
+  const auto each_live = [&](auto visit) {
+    const Grid& base = grid_named(db, "base");
+    each_patch(base, [&](std::size_t k, auto) {
+      if (!base.patches[k].dormant()) visit(k, lod_box(base, k));
+    });
+  };
+  each_live([&](std::size_t k, const LodBox&) { live.insert(k); });
+  const Extent own = folder.add(db, survey(1000), "east").extent,
+               told = db.changed_since(before).at(0).extent;
+  each_live([&](std::size_t k, const LodBox&) { live.erase(k); });
+  int beside = 0;
+  for (const std::size_t k : live) {
+    const LodBox b = lod_box(grid_named(db, "base"), k);
+    EXPECT_TRUE(told.contains({b.xmin, b.ymin}) && told.contains({b.xmax, b.ymax})) << k;
+    beside += b.xmin < own.xmin - 40;
+  }
+  EXPECT_GT(beside, 0) << "negative control: the grid's own bounds would not do";
 }
 
 TEST(InsertRemove, GivesBackTheDatabaseThatNeverSawTheGrid) {
@@ -246,12 +314,14 @@ TEST(Replace, IsRemovalAndImportInOneChange) {
   const std::vector<GridFile> files = surveys(3, random);
   Database db = folder.database(), other = folder.database("other");
   folder.add(db, files[0], "base"), folder.add(other, files[0], "base");
-  folder.add(db, files[1], "survey");
+  const Extent gone = folder.add(db, files[1], "survey").extent;
   const std::uint64_t before = db.version();
   const ImportReport r = folder.add(db, files[2], "survey", {.replace = "survey"});
   folder.add(other, files[2], "survey");
   EXPECT_EQ(db.version(), before + 1) << "no reader sees it without the survey";
   EXPECT_GT(r.removed, 0u);
+  const Extent told = db.changed_since(before).at(0).extent;
+  EXPECT_TRUE(told.contains({gone.xmin, gone.ymin}) && told.contains({gone.xmax, gone.ymax}));
   EXPECT_EQ(db.content_hash(), other.content_hash());
   EXPECT_TRUE(db.check().empty());
   // The next grid may get the number of the one that left; its heights must be its own.

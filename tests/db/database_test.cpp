@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -425,10 +426,17 @@ TEST(Database, DamageIsReportedWithTheNameOfTheFile) {
   EXPECT_NE(damaged("DROP TABLE payload"), "");
 }
 
-// --- Files of earlier versions.
+// --- Records that someone made up, and files of earlier versions.
 
-// The record of the only grid without one of its facts.
-void forget(const std::string& path, const std::string& fact) {
+void put_facts(const std::string& path, const std::vector<std::uint8_t>& cbor) {
+  std::string hex;
+  for (const std::uint8_t byte : cbor) hex += fmt::format("{:02x}", byte);
+  execute(path, fmt::format("UPDATE grid SET facts = x'{}', checksum = {}", hex,
+                            std::int64_t(checksum(std::as_bytes(std::span(cbor))))));
+}
+
+// Gives the record of the only grid other facts, with the checksum that they should have.
+void change_facts(const std::string& path, const std::function<void(nlohmann::json&)>& change) {
   sqlite3* raw = nullptr;
   ASSERT_EQ(sqlite3_open(path.c_str(), &raw), SQLITE_OK);
   const std::unique_ptr<sqlite3, int (*)(sqlite3*)> closed(raw, sqlite3_close);
@@ -438,29 +446,80 @@ void forget(const std::string& path, const std::string& fact) {
   const auto* bytes = static_cast<const std::uint8_t*>(sqlite3_column_blob(facts, 0));
   nlohmann::json record = nlohmann::json::from_cbor(bytes, bytes + sqlite3_column_bytes(facts, 0));
   sqlite3_finalize(facts);
-  ASSERT_EQ(record.erase(fact), 1u);
-  const std::vector<std::uint8_t> cbor = nlohmann::json::to_cbor(record);
-  std::string hex;
-  for (const std::uint8_t byte : cbor) hex += fmt::format("{:02x}", byte);
-  execute(path, fmt::format("UPDATE grid SET facts = x'{}', checksum = {}", hex,
-                            std::int64_t(checksum(std::as_bytes(std::span(cbor))))));
+  change(record);
+  put_facts(path, nlohmann::json::to_cbor(record));
 }
 
-// They do not say how far a surface stands beyond its samples; what is assumed must hold it, which of a flat
-// lake is what storing it lost.
+TEST(Database, ARecordThatCannotBeIsRefusedThoughItsChecksumHolds) {
+  const auto refused = [](const std::function<void(const std::string&)>& spoil) {
+    const GridFolder folder;
+    const std::string path = folder.path("grids.patchwork");
+    {
+      Database db = folder.database();
+      folder.add(db, heights("1 2 / 3 4"), "only");
+    }
+    spoil(path);
+    return refusal_of([&] { Database::open(path); });
+  };
+  EXPECT_EQ(refused([](const std::string& path) { change_facts(path, [](nlohmann::json&) {}); }), "")
+      << "negative control";
+  EXPECT_TRUE(says(refused([](const std::string& path) {
+                     change_facts(path, [](nlohmann::json& f) { f["width"] = f["height"] = 1400000; });
+                   }),
+                   "an impossible size"));
+  EXPECT_TRUE(says(refused([](const std::string& path) {
+                     change_facts(path, [](nlohmann::json& f) { f["frame"] = {0, 1, 0.01, 0, 0, -1}; });
+                   }),
+                   "an impossible frame"));
+  EXPECT_TRUE(says(refused([](const std::string& path) {
+                     put_facts(path, std::vector<std::uint8_t>(1000000, 0x81));  // lists in lists
+                   }),
+                   "too long"));
+  EXPECT_TRUE(says(refused([](const std::string& path) { execute(path, "UPDATE grid SET id = 65537"); }),
+                   "an impossible id"));
+  EXPECT_TRUE(says(refused([](const std::string& path) {
+                     execute(path, "UPDATE fact SET value = '1x' WHERE key = 'version'");
+                   }),
+                   "fact version is damaged"));
+}
+
+// What was read before is no state of the file any more; and the next grid gets the number of the one that
+// left, but not its heights.
+TEST(Database, ARefreshThatFailedCanBeAskedAgain) {
+  const GridFolder folder;
+  Database writer = folder.database();
+  folder.add(writer, heights("1 2 / 3 4"), "one");
+  Database reader = Database::open(writer.path());
+  reader.surface(PatchId::make(reader.grids()[0].info.id, 0, 0, 0));
+  writer.remove("one"), folder.add(writer, heights("5 6 / 7 8"), "two");
+  ASSERT_EQ(writer.grids()[0].info.id, reader.grids()[0].info.id);
+  execute(writer.path(), "UPDATE grid SET checksum = checksum + 1");
+  for (int k = 0; k < 2; ++k) {
+    EXPECT_NE(refusal_of([&] { reader.refresh(); }), "");
+    EXPECT_TRUE(reader.grids().empty());
+    EXPECT_NE(refusal_of([&] { reader.tree(); }), "");
+  }
+  execute(writer.path(), "UPDATE grid SET checksum = checksum - 1");
+  EXPECT_TRUE(reader.refresh());
+  EXPECT_EQ(reader.content_hash(), writer.content_hash());
+  EXPECT_EQ(different_surfaces(reader, reader.grids()[0], writer, writer.grids()[0]), 0);
+}
+
+// Files of earlier versions do not say how far a surface stands beyond its samples; what is assumed must hold
+// it, which of a flat lake is what storing it lost.
 TEST(Database, AFileThatDoesNotSayHowFarItsSurfaceStandsBeyondIsGivenEnough) {
   for (const double waves : {0.01, 30.0}) {
     const GridFolder folder;
     Database written = folder.database();
-    const auto lake = [&](int i, int j) { return (i / 2 + j / 2) % 2 ? waves : -waves; };
+    const auto lake = [&](int i, int j) { return (i + j) % 2 ? waves : -waves; };
     folder.add(written, {.at = lake}, "lake", {.tolerance = 0.5});
     const GridInfo said = written.grids()[0].info;
     ASSERT_GE(said.overshoot, said.quantisation);
-    forget(written.path(), "overshoot");
+    change_facts(written.path(), [](nlohmann::json& facts) { EXPECT_EQ(facts.erase("overshoot"), 1u); });
     const Database earlier = Database::open(written.path());
     const GridInfo assumed = earlier.grids()[0].info;
     EXPECT_GE(assumed.overshoot, said.overshoot);
-    EXPECT_LE(assumed.overshoot, 2.2 * (2 * waves + 4 * said.quantisation));
+    EXPECT_LE(assumed.overshoot, 3.1 * (2 * waves + 4 * said.quantisation));
   }
 }
 

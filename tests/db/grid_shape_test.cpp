@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 #include <set>
 #include <utility>
 #include <vector>
+
+#include "tests/seed.h"
 
 namespace patchwork {
 namespace {
@@ -37,6 +40,29 @@ template <class Visit>
 void each_block(const GridShape& s, int level, Visit visit) {
   for (int by = 0; by < s.blocks_j(level); ++by)
     for (int bx = 0; bx < s.blocks_i(level); ++bx) visit(bx, by);
+}
+
+// Corners where large numbers cancel: R-tree boxes and regions are compared with what is computed of them.
+TEST(Frame, BoundsHoldTheExactCorners) {
+  std::mt19937_64 random(test_seed(5));
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  int cancelled = 0;
+  for (int n = 0; n < 20000; ++n) {
+    const double angle = uniform(0, 7), step = uniform(1, 40), i = std::floor(uniform(0, 250000)),
+                 j = std::floor(uniform(0, 250000)), c = step * std::cos(angle), s = step * std::sin(angle);
+    // So that the corner (i, j) lies near the origin.
+    const Frame f = Frame::from_trusted({-(c * i + s * j) + uniform(0, 0.01), c, s, -(s * i - c * j), s, -c});
+    const auto& m = f.numbers();
+    const long double x = m[0] + ((long double)m[1] * i + (long double)m[2] * j),
+                      y = m[3] + ((long double)m[4] * i + (long double)m[5] * j);
+    const Extent e = f.bounds({i, j, i + 28, j + 28});
+    ASSERT_TRUE(e.xmin <= x && x <= e.xmax && e.ymin <= y && y <= e.ymax) << n;
+    const Point p = f.to_domain(i, j);
+    cancelled += std::abs(double(x) - p.x) > 4e-16 * std::abs(p.x);
+  }
+  EXPECT_GT(cancelled, 5000) << "negative control: by the corner's own size they would not be held";
 }
 
 TEST(GridShape, TheCoreIsTheFootprintLessOneFeatherThatIsAtMostAQuarterOfASide) {

@@ -256,6 +256,11 @@ TEST(LodPage, FloatsFromTheOriginHoldTheBoxes) {
       }
     }
   }
+  LodPage page(0);
+  for (const double x : {0.0, 1e9}) page.append({{x, 0, x + 1, 1, 1, 2}, {1}});
+  page.remove(0), page.remove(0);
+  page.append({{0, 0, 1, 1, 1, 2}, {1}});
+  EXPECT_EQ(page.reach, 1) << "what was emptied begins anew";
   EXPECT_LT(furthest, 0x1p-23);
   EXPECT_GT(furthest, 0) << "negative control: floats do lose something";
 }

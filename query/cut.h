@@ -46,8 +46,9 @@ struct ViewCut {
   int width = 1280, height = 720;  ///< pixels
   double pixel_error = 1;          ///< pixels
   double far = 0;                  ///< metres along the line of sight; REQUIRES: > 0
-  double lowest = 0,
-         highest = 0;  ///< of the best terrain, metres; the others are beyond by their errors alone
+  /// Metres: of all grids' surfaces at level 0. A coarser patch is farther out by its error at most, which is
+  /// seen under `pixel_error`.
+  double lowest = 0, highest = 0;
   /// The distance in space instead, to the nearest height in [lowest, highest]: fewer patches for an eye high
   /// above, and the error is still seen under at most `pixel_error`, because no terrain is nearer than that.
   bool in_space = false;
@@ -74,8 +75,9 @@ struct FieldCut {
   bool strict = false;
 };
 
-/// Throw Error: a number that is none or negative, a view without extent or of more than 1e100 metres, a line
-/// of less than two points, a field that is not width x height.
+/// Throw Error: a number that is none or negative; a view without extent, with lengths or pixels beyond 1e100
+/// or an eye within 1e-100 m of what it looks at; a line of less than two points, a field that is not width x
+/// height.
 std::unique_ptr<CutSurface> make_surface(const UniformCut& cut);
 std::unique_ptr<CutSurface> make_surface(const ViewCut& cut);
 std::unique_ptr<CutSurface> make_surface(const CorridorCut& cut);
@@ -84,7 +86,8 @@ std::unique_ptr<CutSurface> make_surface(const FieldCut& cut);
 /// The same view with `far`, `lowest` and `highest` such that it sees all that the database holds.
 ViewCut over_terrain_of(const Database& db, ViewCut cut);
 
-/// The corners of a view's region, counterclockwise; fewer than three where it sees nothing.
+/// The corners of a view's region, counterclockwise; fewer than three where it sees nothing. Throws as
+/// make_surface does.
 std::vector<Point> footprint(const ViewCut& cut);
 
 }  // namespace patchwork

@@ -39,6 +39,21 @@ std::vector<Point> convex_hull(std::vector<Point> points) {
   return hull;
 }
 
+void expect_sound(const ViewCut& v) {
+  // So that neither squares of lengths, times what a wide picture makes of them, nor their reciprocals
+  // overflow.
+  constexpr double kMost = 1e100, kLeast = 1 / kMost;
+  for (const double n : {v.eye.x, v.eye.y, v.eye.z, v.look.x, v.look.y, v.look.z, v.lowest, v.highest, v.far})
+    require(std::abs(n) <= kMost, "view", "eye, look, far and heights must be metres, up to 1e100");
+  require(std::hypot(v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z) >= kLeast, "view",
+          "eye and look are the same point");
+  require(v.fov_degrees > 0 && v.fov_degrees < 180, "fov", "it must be between 0 and 180 degrees");
+  require(v.width > 0 && v.height > 0, "size", "width and height must be pixels, at least 1");
+  require(v.pixel_error >= 0 && v.pixel_error <= kMost, "pixel-error",
+          "it must be a number of pixels, 0 to 1e100");
+  require(v.far > 0 && v.lowest <= v.highest, "view", "it has no extent");
+}
+
 class ViewSurface : public CutSurface {
  public:
   explicit ViewSurface(const ViewCut& cut)
@@ -92,6 +107,7 @@ class ViewSurface : public CutSurface {
 }  // namespace
 
 std::vector<Point> footprint(const ViewCut& v) {
+  expect_sound(v);
   const Vector eye{v.eye.x, v.eye.y, v.eye.z};
   const Vector forward = normalised({v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z});
   const bool steep = std::hypot(forward[0], forward[1]) < 1e-9;
@@ -130,19 +146,6 @@ ViewCut over_terrain_of(const Database& db, ViewCut v) {
   return v;
 }
 
-std::unique_ptr<CutSurface> make_surface(const ViewCut& v) {
-  // So that neither areas nor their reciprocals overflow.
-  constexpr double kMost = 1e100, kLeast = 1 / kMost;
-  for (const double n : {v.eye.x, v.eye.y, v.eye.z, v.look.x, v.look.y, v.look.z, v.lowest, v.highest, v.far})
-    require(std::abs(n) <= kMost, "view", "eye, look, far and heights must be metres, up to 1e100");
-  require(std::hypot(v.look.x - v.eye.x, v.look.y - v.eye.y, v.look.z - v.eye.z) >= kLeast, "view",
-          "eye and look are the same point");
-  require(v.fov_degrees > 0 && v.fov_degrees < 180, "fov", "it must be between 0 and 180 degrees");
-  require(v.width > 0 && v.height > 0, "size", "width and height must be pixels, at least 1");
-  require(v.pixel_error >= 0 && v.pixel_error <= kMost, "pixel-error",
-          "it must be a number of pixels, 0 to 1e100");
-  require(v.far > 0 && v.lowest <= v.highest, "view", "it has no extent");
-  return std::make_unique<ViewSurface>(v);
-}
+std::unique_ptr<CutSurface> make_surface(const ViewCut& v) { return std::make_unique<ViewSurface>(v); }
 
 }  // namespace patchwork

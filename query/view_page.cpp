@@ -21,9 +21,9 @@ namespace {
 
 // What a page's floats are compared with, metres from its origin: wide enough for what floats lose, so that
 // no box is missed. Lengths by kLoss of all that they were made from, tolerances a metre by kHair, which also
-// covers what a frame's shear adds to a patch's range.
-constexpr double kLoss = 0x1p-21, kHair = 0x1p-16;
-static_assert(kHair - 0x1p-19 >= Frame::kMostShear);
+// covers what a frame's shear adds to a patch's range, besides what floats lose of tolerances.
+constexpr double kLoss = 0x1p-21, kHair = 0x1p-16, kRounding = 0x1p-19;
+static_assert(kHair - kRounding >= Frame::kMostShear);
 // Tolerances a metre of distance, and distances, whose squares stay floats; kNothing is what may vanish
 // there.
 constexpr double kLeast = 1e-15, kMost = 1e18;

@@ -11,8 +11,8 @@ namespace patchwork {
 /// A view as a question to pages: the squared tolerance is slope^2 times the squared distance to an eye, over
 /// a convex region.
 struct PageView {
-  /// A pyramid between two planes has at most 21 corners: 5 ends of its edges, and 8 edges that cross both.
-  /// Rounded, and all nearly on one line, each may be a corner of either side of their hull.
+  /// footprint() makes 21 points at most, the pyramid's 5 ends and two on each of its 8 edges; rounded, and
+  /// all nearly on one line, each may be a corner of either side of their hull.
   static constexpr std::size_t kMostSides = 40;
 
   PageView(Point eye, double above, double slope);

@@ -100,6 +100,13 @@ struct AsGrid {
   Grid grid;
 };
 
+// The cut's own range and region, of the box as a patch.
+bool is_meant(const CutSurface& cut, const LodBox& box) {
+  const AsGrid as(box);
+  const ToleranceRange r = cut.over(as.grid.info.frame, as.grid.info.shape.domain(0, 0, 0));
+  return double(box.bottom) <= r.high && r.low < double(box.top) && cut.meets(as.grid, {0, 0, 0});
+}
+
 void expect_no_box_missed(const LodTree& tree, const std::vector<LodEntry>& all, const CutSurface& cut,
                           std::size_t& found, std::size_t& spare) {
   std::set<std::uint64_t> hit;
@@ -107,15 +114,12 @@ void expect_no_box_missed(const LodTree& tree, const std::vector<LodEntry>& all,
              [&](const LodEntry& e) { hit.insert(e.id.value); });
   std::size_t exact = 0;
   for (const LodEntry& e : all) {
-    const AsGrid as(e.box);
-    const ToleranceRange r = cut.over(as.grid.info.frame, as.grid.info.shape.domain(0, 0, 0));
-    if (!(double(e.box.bottom) <= r.high && r.low < double(e.box.top)) || !cut.meets(as.grid, {0, 0, 0}))
-      continue;
+    if (!is_meant(cut, e.box)) continue;
     ++exact;
-    ASSERT_TRUE(hit.contains(e.id.value)) << "a box that the cut meets was not visited: "
-                                          << testing::PrintToString(std::vector<double>{
-                                                 e.box.xmin, e.box.ymin, e.box.xmax, e.box.ymax,
-                                                 double(e.box.bottom), double(e.box.top), r.low, r.high});
+    ASSERT_TRUE(hit.contains(e.id.value))
+        << "a box that the cut meets was not visited: "
+        << testing::PrintToString(std::vector<double>{e.box.xmin, e.box.ymin, e.box.xmax, e.box.ymax,
+                                                      double(e.box.bottom), double(e.box.top)});
   }
   found += exact, spare += hit.size() - exact;
 }
@@ -201,7 +205,7 @@ TEST(ViewCutsOfPages, MissNoPatchOfAShearedFrame) {
     const double away = std::exp2(random.uniform(8, 20)), i = away / f.step_i(), j = away / f.step_j();
     const Point eye = f.to_domain(10 - i, n % 2 ? 10 - j : 10 + j), look = f.to_domain(10, 10);
     ViewCut v = random.view(3000);
-    v.eye = {eye.x, eye.y, 100}, v.look = {look.x, look.y, 0}, v.far = 1.6 * away;
+    v.eye = {eye.x, eye.y, n % 4 < 2 ? 100.0 : 1000.0}, v.look = {look.x, look.y, 0}, v.far = 1.6 * away;
     const auto cut = make_surface(v);
     const LatticeRect domain = grid.info.shape.domain(0, 0, 0);
     const ToleranceRange r = cut->over(grid.info.frame, domain);
@@ -226,7 +230,7 @@ TEST(ViewCutsOfPages, TakeViewsOfAnySize) {
   Random random(test_seed(23));
   LodPage page(0);
   for (std::uint64_t k = 0; k < LodPage::kSlots; ++k) page.append(random_box(random, k));
-  std::size_t most = 0, regions = 0;
+  std::size_t most = 0, regions = 0, met = 0;
   for (int n = 0; n < 20000; ++n) {
     ViewCut v = random.view(3000);
     const auto scale = [&] { return std::exp2(random.uniform(-300, 330)); };
@@ -243,8 +247,15 @@ TEST(ViewCutsOfPages, TakeViewsOfAnySize) {
     const std::vector<Point> corners = footprint(v);
     for (const Point& p : corners) ASSERT_TRUE(std::isfinite(p.x) && std::isfinite(p.y)) << n;
     most = std::max(most, corners.size()), regions += corners.size() >= 3;
-    make_surface(v)->hits(page, false);
+    const auto cut = make_surface(v);
+    const std::uint64_t hits = cut->hits(page, false).met;
+    for (std::uint32_t s = 0; s < page.count; ++s) {
+      const bool hit = (hits >> s & 1) != 0, meant = is_meant(*cut, page.box(s));
+      ASSERT_TRUE(hit || !meant) << n << " " << s;
+      met += meant;
+    }
   }
+  EXPECT_GT(met, 10000u);
   EXPECT_GT(regions, 5000u);
   EXPECT_LE(most, PageView::kMostSides);
   EXPECT_NE(refusal_of([] {

@@ -1,7 +1,11 @@
 #include "render/camera_path.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+
+#include "db/error.h"
 
 namespace patchwork {
 
@@ -50,6 +54,10 @@ std::vector<Point> in_plane(const std::vector<Point3>& points) {
 CameraPath::CameraPath(const Flight& flight)
     : flight_(flight), arcs_(clothoids_through(in_plane(flight.points))), knots_{0} {
   for (const Clothoid& arc : arcs_) knots_.push_back(knots_.back() + arc.length);
+  if (frames() > Flight::kMostFrames)
+    throw Error("path",
+                fmt::format("it has {} frames or more, {} at most are drawn", frames(), Flight::kMostFrames),
+                "fly faster, or say how many with \"frames\"");
 }
 
 int CameraPath::frames() const {

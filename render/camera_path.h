@@ -13,7 +13,7 @@ namespace patchwork {
 /// overshoot nor kink (monotone cubics over the length of the way).
 class CameraPath {
  public:
-  /// Throws Error: points through which no smooth way leads.
+  /// Throws Error: points through which no smooth way leads, more than Flight::kMostFrames.
   explicit CameraPath(const Flight& flight);
 
   double length() const { return knots_.back(); }  ///< metres over ground

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -13,7 +14,15 @@ namespace {
 
 constexpr std::size_t kShown = 40;  // characters of a wrong value
 
+// Values within values, so many levels of them at most: a file may nest more than a stack holds.
+bool is_shallow(const Json& j, int levels = 3) {
+  if (!j.is_structured()) return true;
+  return levels > 0 &&
+         std::all_of(j.begin(), j.end(), [&](const Json& inner) { return is_shallow(inner, levels - 1); });
+}
+
 std::string found(const Json& j) {
+  if (!is_shallow(j)) return std::string(", found a deep ") + j.type_name();
   const std::string text = j.dump(-1, ' ', true, Json::error_handler_t::replace);
   return ", found " + (text.size() > kShown ? text.substr(0, kShown) + "..." : text);
 }

@@ -24,7 +24,8 @@ static void describe(Fields<Flight>& f) {
   f.number("pitch", &Flight::pitch, between(-89, 89), "degrees above the way ahead; without targets");
   f.number("speed_m_s", &Flight::speed, above(0), "over ground, metres a second");
   f.number("frames_per_second", &Flight::frames_per_second, above(0), "pictures a second of the flight");
-  f.integer("frames", &Flight::frames, between(1, 1000000), "so many pictures, whatever the speed");
+  f.integer("frames", &Flight::frames, between(1, Flight::kMostFrames),
+            "so many pictures, whatever the speed");
   f.number("fov_degrees", &Flight::fov_degrees, between(0.01, 170), "the vertical angle of view");
 }
 

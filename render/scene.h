@@ -29,6 +29,7 @@ struct Viewpoint {
 
 /// A flight through points; camera_path.h makes the frames.
 struct Flight {
+  static constexpr int kMostFrames = 1000000;
   std::vector<Point3> points;   ///< two or more; neighbours differ in the plane
   std::vector<Point3> targets;  ///< looked at on the way: none, one, or one for each point
   double look_ahead = 300;      ///< metres of way ahead that the eye looks at, without targets

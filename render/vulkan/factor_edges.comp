@@ -13,11 +13,6 @@ const uint kOut = 256u, kSegments = 255u, kNone = 0xffffffffu;
 uint need(uint draw, ivec2 b) {
   return texelFetch(factors, int(draw) * 64 + b.y * kBlocks + b.x).x & kSegments;
 }
-// Blocks along a side, by their number from its beginning.
-ivec2 at_side(int s, int along) {
-  const int end = (s & 1) * (kBlocks - 1);
-  return s < 2 ? ivec2(end, along) : ivec2(along, end);
-}
 
 // Segments of the edge at side s of the tile, in this tile's terms.
 uint border_need(uint d, int s, int along, uint own) {

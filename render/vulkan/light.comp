@@ -19,7 +19,7 @@ layout(push_constant) uniform Push {
 } push;
 
 const int kSquare = 16;
-const float kFirst = 1.5, kNoData = -1e4;
+const float kFirst = 1.5, kNoData = -9e4;  // above what Relief has where there are no heights
 
 int width = push.width, height = push.height, top = push.top;
 

@@ -167,7 +167,9 @@ void LightMap::use_heights() {
     sun_.stale = sun_.stale.with(shadowed_by(changed));
     sky_.stale = sky_.stale.with(seeing(changed, std::max(range_before, relief_->range())));
   }
-  if (!same_shape) sun_.image.reset(), sky_.image.reset(), ++generation_;
+  if (same_shape) return;
+  sun_.image.reset(), sky_.image.reset(), ++generation_;
+  sun_.stale = whole(sun_), sky_.stale = whole(sky_);
 }
 
 // Towards the sun these samples lie, or cells beside them.

@@ -18,11 +18,6 @@ shared uint block_triangles[64], rows[kBlocks];
 uint need(uint draw, ivec2 b, int s) {
   return texelFetch(needs, int(draw) * 64 + b.y * kBlocks + b.x).z >> (8 * s) & 0xffu;
 }
-// Blocks along a side, by their number from its beginning.
-ivec2 at_side(int s, int along) {
-  const int end = (s & 1) * (kBlocks - 1);
-  return s < 2 ? ivec2(end, along) : ivec2(along, end);
-}
 // Bit p becomes bit 2 p.
 uint spread(uint bits) {
   bits = (bits | bits << 4) & 0x0f0fu;

@@ -25,6 +25,11 @@ Draw draw_at(int d) {
   const uvec4 t = texelFetch(draws, d * kDraw);
   return Draw(ivec2(t.xy), int(t.z), int(t.w));
 }
+// Blocks along side s of a tile, by their number from its beginning.
+ivec2 at_side(int s, int along) {
+  const int end = (s & 1) * (kBlocks - 1);
+  return s < 2 ? ivec2(end, along) : ivec2(along, end);
+}
 vec4 facts_at(int d) { return uintBitsToFloat(texelFetch(draws, d * kDraw + 9)); }
 
 // The texel of the vertex at half cells `at` of a tile; inside the tile both are even. One way for all: lavapipe

@@ -27,7 +27,7 @@ struct TileStore {
   Buffer heights, blocks;  ///< terrain.glsl; factors.comp or needs.comp
   OwnedView height_texels, block_texels;
   Texture slopes;                    ///< always in layout general: written by one shader, read by another
-  std::optional<Texture> knowledge;  ///< of half cells: bound, source (as BlendOutput has it); as slopes are
+  std::optional<Texture> knowledge;  ///< of half cells: bound, source (grid id + 1); as slopes are
   OwnedSampler sampler;
 };
 

@@ -154,6 +154,13 @@ TEST(CameraPath, LooksAlongTheWayOrAtItsTarget) {
   EXPECT_NEAR(CameraPath(f).at(200, 64, 36).look.y, 0, 1e-9);
 }
 
+TEST(CameraPath, RefusesMoreFramesThanAnyoneDraws) {
+  Flight flight{.points = {{0, 0, 9}, {100000, 0, 9}}, .targets = {}, .frames = {}};
+  EXPECT_EQ(refusal_of([&] { CameraPath{flight}; }), "") << "negative control";
+  flight.speed = 0.001;
+  EXPECT_NE(refusal_of([&] { CameraPath{flight}; }).find("fly faster"), std::string::npos);
+}
+
 TEST(CameraPath, RefusesPointsThatMakeNoWay) {
   EXPECT_NE(refusal_of([] { clothoids_through({{0, 0}}); }).find("at least two"), std::string::npos);
   EXPECT_NE(refusal_of([] {

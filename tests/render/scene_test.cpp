@@ -83,6 +83,8 @@ TEST(Scene, ARefusalNamesThePlaceAndWhatIsThere) {
   says(R"({"background": "#12345g"})", "background: it must be a colour like \"#7dab8c\", found \"#12345g\"");
   says(R"({"effects": []})", "effects: it must be an object {...}, found []");
   says("[]", "it must be an object {...}, found []");
+  const std::string deep = std::string(300000, '[') + std::string(300000, ']');
+  says("{\"camera\": " + deep + "}", "camera: it must be an object {...}, found a deep array");
 }
 
 TEST(Scene, AnUnknownMemberIsNamedWithTheKnownOnes) {

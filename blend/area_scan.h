@@ -16,9 +16,7 @@ struct Area {
   std::function<void(double)> progress = {};  ///< may be empty; told the share of rows that is done
 
   double pixel() const;  ///< square metres
-  Point centre(int c, int r) const {
-    return {frame.x0 + (frame.xc * c + frame.xr * r), frame.y0 + (frame.yc * c + frame.yr * r)};
-  }
+  Point centre(int c, int r) const { return frame.at(c, r); }
 };
 
 /// A row of the area, evaluated.

@@ -53,6 +53,9 @@ struct BlendCounts {
 /// Points of a raster: pixel (c, r) lies at (x0 + xc c + xr r, y0 + yc c + yr r).
 struct RasterFrame {
   double x0 = 0, xc = 1, xr = 0, y0 = 0, yc = 0, yr = 1;
+  Point at(double column, double row) const {
+    return {x0 + (xc * column + xr * row), y0 + (yc * column + yr * row)};
+  }
 };
 
 /// Whatever evaluates the surface: Blend on the CPU, VulkanBlend on a graphics card.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <iostream>
 #include <map>
 
 #include "blend/vulkan/vulkan_blend.h"
@@ -70,6 +71,10 @@ CLI::Validator finite() {
           "finite"};
 }
 
+CLI::Validator not_empty() {
+  return {[](const std::string& s) { return s.empty() ? std::string("it is empty") : ""; }, "TEXT"};
+}
+
 CLI::Validator zero_or_more() {
   return {[](const std::string& s) {
             const double v = std::strtod(s.c_str(), nullptr);
@@ -123,9 +128,15 @@ void RegionOptions::add_to(CLI::App& v, bool with_polygon) {
 }
 
 Region RegionOptions::region() const {
-  if (!polygon.empty()) return Region::parse_polygon(polygon);
+  if (polygon) return Region::parse_polygon(*polygon);
   if (extent.size() == 4) return Region::inside(Extent{extent[0], extent[1], extent[2], extent[3]});
   return {};
+}
+
+void expect_end_of(const std::istream& in) {
+  // A stream that shares its buffer with stdio hears of no failure.
+  if (in.bad() || !in.eof() || (&in == &std::cin && std::ferror(stdin)))
+    throw Error("standard input", "it cannot be read to its end");
 }
 
 void print(const Json& document) { fmt::print("{}\n", document.dump(2)); }

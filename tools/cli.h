@@ -5,8 +5,10 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <iosfwd>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -56,6 +58,8 @@ Database open_filled(const std::string& path, const Common& common);
 CLI::Validator above_zero();
 CLI::Validator zero_or_more();
 CLI::Validator finite();
+/// Of a name: "" is what a script gives whose variable is not set.
+CLI::Validator not_empty();
 
 /// A bar with share, rate and remaining time on stderr: on a terminal, when the work lasts longer than a
 /// second.
@@ -97,10 +101,14 @@ std::string engine_name(const Evaluator& evaluator);
 /// The region options of a query: --extent and --polygon.
 struct RegionOptions {
   std::vector<double> extent;
-  std::string polygon;
+  std::optional<std::string> polygon;
+  bool given() const { return !extent.empty() || polygon; }
   void add_to(CLI::App& verb, bool with_polygon);
   Region region() const;  ///< throws Error where they are no region
 };
+
+/// Throws Error where standard input ended because it could not be read on.
+void expect_end_of(const std::istream& in);
 
 void print(const Json& document);
 /// A warning or a note on stderr, not with --quiet.

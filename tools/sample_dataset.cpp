@@ -70,7 +70,8 @@ class SampleWriter {
   void choose() {
     type_ = GDALGetDataTypeByName(grid_.sample_type.c_str());
     if (type_ == GDT_Unknown || (grid_.quantisation > 0 && GDALDataTypeIsInteger(type_))) type_ = GDT_Float64;
-    if (type_ == GDT_Byte && range_.low < 0) type_ = GDT_Int16;
+    const bool below = range_.low < 0 || (range_.holes && grid_.nodata.value_or(0) < 0);
+    if (type_ == GDT_Byte && below) type_ = GDT_Int16;
     if (!range_.holes) return;
     if (!range_.nodata) nodata_ = grid_.nodata;
     if (nodata_) return;
@@ -96,36 +97,35 @@ class SampleWriter {
     const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
     GDALDatasetUniquePtr out(GetGDALDriverManager()->GetDriverByName("GTiff")->Create(
         name.c_str(), width(), height(), 1, type_, options.List()));
-    bool good = out != nullptr;
-    if (good) {
-      describe(*out);
-      GDALRasterBand& band = *out->GetRasterBand(1);
-      each_strip(from_, 1, [&](int row, std::span<const double> strip) {
-        std::vector<double> values(strip.begin(), strip.end());
-        for (double& v : values)
-          if (std::isnan(v)) v = *nodata_;
-        const int rows = int(values.size() / size_t(width()));
-        good = good && band.RasterIO(GF_Write, 0, row, width(), rows, values.data(), width(), rows,
-                                     GDT_Float64, 0, 0, nullptr) == CE_None;
-      });
-      CPLErrorReset();
-      out.reset();  // writes the last blocks: what fails is only told as an error
-      good = good && CPLGetLastErrorType() < CE_Failure;
-    }
-    if (!good) throw Error(path, std::string("it cannot be written: ") + CPLGetLastErrorMsg());
+    const auto expect = [&](bool good) {
+      if (!good) throw Error(path, std::string("it cannot be written: ") + CPLGetLastErrorMsg());
+    };
+    expect(out != nullptr && describe(*out));
+    each_strip(from_, 1, [&](int row, std::span<const double> strip) {
+      std::vector<double> values(strip.begin(), strip.end());
+      for (double& v : values)
+        if (std::isnan(v)) v = *nodata_;
+      const int rows = int(values.size() / size_t(width()));
+      expect(out->GetRasterBand(1)->RasterIO(GF_Write, 0, row, width(), rows, values.data(), width(), rows,
+                                             GDT_Float64, 0, 0, nullptr) == CE_None);
+    });
+    CPLErrorReset();
+    out.reset();  // writes the last blocks: what fails is only told as an error
+    expect(CPLGetLastErrorType() < CE_Failure);
   }
 
-  void describe(GDALDataset& out) const {
+  bool describe(GDALDataset& out) const {
     const auto& n = grid_.frame.numbers();
     double geotransform[] = {n[0] - (n[1] + n[2]) / 2, n[1], n[2], n[3] - (n[4] + n[5]) / 2, n[4], n[5]};
-    out.SetGeoTransform(geotransform);
-    if (!db_.crs().empty()) out.SetProjection(db_.crs().c_str());
+    bool good = out.SetGeoTransform(geotransform) == CE_None;
+    if (!db_.crs().empty()) good = good && out.SetProjection(db_.crs().c_str()) == CE_None;
     if (!grid_.shape.pixel_is_area()) out.SetMetadataItem("AREA_OR_POINT", "Point");
     GDALRasterBand& band = *out.GetRasterBand(1);
-    if (nodata_) band.SetNoDataValue(*nodata_);
-    if (grid_.raw_scale != 1) band.SetScale(grid_.raw_scale);
-    if (grid_.base != 0) band.SetOffset(grid_.base);
+    if (nodata_) good = good && band.SetNoDataValue(*nodata_) == CE_None;
+    if (grid_.raw_scale != 1) good = good && band.SetScale(grid_.raw_scale) == CE_None;
+    if (grid_.base != 0) good = good && band.SetOffset(grid_.base) == CE_None;
     band.SetUnitType("m");
+    return good;
   }
 
   const Database& db_;

@@ -38,8 +38,9 @@ struct BlockShares {
   std::uint64_t out = 0, inside = 0, partial = 0;
 };
 
-/// The limits of agreement: heights and bounds differ from Blend's by at most 1e-3 m + 1e-6 of the height.
-/// The bits depend on the data, the tile and the vertex alone. Not safe for concurrent use.
+/// Heights of rasters differ from Blend's by at most departure(), which their bounds count besides Blend's;
+/// at points it computes in double, as Blend does. The bits depend on the data, the tile and the vertex
+/// alone. Not safe for concurrent use.
 class VulkanBlend : public Evaluator {
  public:
   /// REQUIRES: `db` outlives it and stays in one state. `patches` in the order of Extraction::patches. Throws
@@ -47,6 +48,9 @@ class VulkanBlend : public Evaluator {
   VulkanBlend(std::shared_ptr<Device> device, const Database& db, std::span<const PatchId> patches,
               const BlendOptions& options, const VulkanOptions& more = {});
   ~VulkanBlend() override;
+
+  /// Metres, for a height of so many.
+  static double departure(double height) { return 1e-3 + 1e-6 * std::abs(height); }
 
   /// The next cut: what is resident still is not sent again.
   void change(std::span<const PatchId> patches);

@@ -42,6 +42,8 @@ class RasterSink {
     transformed(h.height, out_.height, height);
     transformed(h.height, out_.height32, [&](float f) { return float(height(f)); });
     transformed(h.bound, out_.bound, [](float f) { return double(f); });
+    for (std::size_t k = 0; k < n && !out_.bound.empty(); ++k)
+      out_.bound[to + k] += VulkanBlend::departure(height(h.height[from + k]));
     transformed(h.source, out_.source, [](std::int32_t s) { return s; });
   }
 

@@ -61,6 +61,52 @@ TEST_F(Import, TheSameGridTwiceIsThereOnce) {
   EXPECT_EQ(again["grids"][0]["duplicate_of"], "a");
   EXPECT_EQ(names(db), Words{"a"});
   EXPECT_EQ(content_hash(db), before);
+  // It cannot take the place of a third.
+  const std::string b = make(hill_file(70, 60), "b.tif");
+  json({"import", db, b, "--json"});
+  const std::string both = content_hash(db);
+  const Outcome o = run({"import", db, a, "--name", "c", "--replace", "b"});
+  EXPECT_SAYS(complaint(o), "the same grid is there as a already");
+  EXPECT_EQ(content_hash(db), both);
+}
+
+TEST_F(Import, SignedBytesKeepTheirHoles) {
+  RasterFile file = hill_file();
+  file.type = GDT_Int16, file.nodata = -128;
+  file.at = [](int i, int) { return i < 10 ? -128. : 5.; };
+  const std::string path = make(file, "wide.tif"), bytes = in_directory("bytes.tif"),
+                    db = in_directory("bytes.pwk"), back = in_directory("back.tif");
+  {
+    const GDALDatasetUniquePtr from(GDALDataset::Open(path.c_str()));
+    CPLStringList options;
+    options.SetNameValue("PIXELTYPE", "SIGNEDBYTE");
+    GDALDriver* tiff = GetGDALDriverManager()->GetDriverByName("GTiff");
+    const GDALDatasetUniquePtr to(tiff->Create(bytes.c_str(), 60, 50, 1, GDT_Byte, options.List()));
+    ASSERT_TRUE(from && to);
+    std::vector<std::int16_t> v(60 * 50);
+    std::vector<std::int8_t> narrow(v.size());
+    ASSERT_EQ(
+        from->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, 60, 50, v.data(), 60, 50, GDT_Int16, 0, 0, nullptr),
+        CE_None);
+    std::copy(v.begin(), v.end(), narrow.begin());
+    double place[6];
+    from->GetGeoTransform(place), to->SetGeoTransform(place);
+    to->SetProjection(from->GetProjectionRef());
+    to->GetRasterBand(1)->SetNoDataValue(-128);
+    ASSERT_EQ(to->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, 60, 50, narrow.data(), 60, 50, GDT_Byte, 0, 0,
+                                             nullptr),
+              CE_None);
+  }
+  ASSERT_EQ(run({"import", db, bytes, "--accuracy", "1", "--quiet"}).code, 0);
+  ASSERT_EQ(run({"export", db, "bytes", back, "--quiet"}).code, 0);
+  const GDALDatasetUniquePtr d(GDALDataset::Open(back.c_str()));
+  ASSERT_TRUE(d);
+  std::vector<double> v(60 * 50);
+  ASSERT_EQ(
+      d->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, 60, 50, v.data(), 60, 50, GDT_Float64, 0, 0, nullptr),
+      CE_None);
+  EXPECT_EQ(std::count(v.begin(), v.end(), d->GetRasterBand(1)->GetNoDataValue()), 10 * 50);
+  EXPECT_EQ(std::count(v.begin(), v.end(), 5), 50 * 50);
 }
 
 TEST_F(Import, JoinedTilesEqualTheWhole) {

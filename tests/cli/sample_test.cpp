@@ -84,7 +84,8 @@ TEST_F(Sample, NamesTheLineThatItCannotRead) {
                                                         {"1 2\nx y\n", "line 2"},
                                                         {"1 2\n1.5.5 2\n", "line 2"},
                                                         {"id,x,y\n1,,4999895\n", "line 2"},
-                                                        {"id,x,z\n1,500105,3\n", "no column y"}}) {
+                                                        {"id,x,z\n1,500105,3\n", "no column y"},
+                                                        {"id,x_utm,y_utm\n1,2,3\n", "no column x"}}) {
     const Outcome o = run({"sample", database_}, {.input = input});
     EXPECT_SAYS(complaint(o), line) << input;
     EXPECT_EQ(lines_of(complaint(o)).size(), 1u) << input;

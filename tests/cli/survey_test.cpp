@@ -159,6 +159,20 @@ TEST_F(AccuracyVerb, TellsTheBestWhereItIsAndWhoAnswers) {
   EXPECT_EQ(o.code, 0) << o.err;
   EXPECT_SAYS(o.out, "smallest error available 0.05");
   EXPECT_TRUE(std::filesystem::exists(map));
+  // Of a polygon the map has as many pixels as its figures say.
+  const Json half = json({"accuracy", database_, "--json", "--map", map, "--polygon",
+                          "500700 4999600, 500900 4999600, 500900 4999800"});
+  const GDALDatasetUniquePtr d(GDALDataset::Open(map.c_str()));
+  ASSERT_TRUE(d);
+  const int width = d->GetRasterXSize(), height = d->GetRasterYSize();
+  std::vector<float> bounds(std::size_t(width) * std::size_t(height));
+  ASSERT_EQ(d->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, width, height, bounds.data(), width, height,
+                                          GDT_Float32, 0, 0, nullptr),
+            CE_None);
+  const auto known = std::count_if(bounds.begin(), bounds.end(), [](float b) { return !std::isnan(b); });
+  const double pixel = half["step"].get<double>() * half["step"].get<double>();
+  EXPECT_NEAR(double(known) * pixel, half["area"].get<double>(), 1e-6);
+  EXPECT_LT(known, std::ptrdiff_t(0.7 * double(bounds.size())));
 }
 
 }  // namespace patchwork

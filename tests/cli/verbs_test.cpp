@@ -37,22 +37,24 @@ TEST_F(Verbs, EachExplainsItself) {
 
 TEST_F(Verbs, WrongUsageExitsWithTwo) {
   const std::string db = hill_database(), tif = in_directory("hills.tif"), out = in_directory("out.tif");
-  const std::vector<Words> wrong{{},
-                                 {"fly", db},
-                                 {"import", db},
-                                 {"import", db, tif, "--unit", "cubits"},
-                                 {"import", db, tif, "--accuracy", "good"},
-                                 {"import", db, tif, tif, "--name", "one"},
-                                 {"info"},
-                                 {"info", db, "--jsno"},
-                                 {"query", db},
-                                 {"query", db, "--error", "1", "--extent", "0", "0", "1"},
-                                 {"sample", db, "--smoothness", "3"},
-                                 {"sample", db, "--blend", "mixed"},
-                                 {"sample", db, "--memory", "much"},
-                                 {"resample", db, out, "--bands", "colour"},
-                                 {"resample", db, out, "--step", "0"},
-                                 {"list", db, "--threads", "-1"}};
+  const std::vector<Words> wrong{
+      {},
+      {"fly", db},
+      {"import", db},
+      {"import", db, tif, "--unit", "cubits"},
+      {"import", db, tif, "--accuracy", "good"},
+      {"import", db, tif, tif, "--name", "one"},
+      {"info"},
+      {"info", db, "--jsno"},
+      {"query", db},
+      {"query", db, "--error", "1", "--extent", "0", "0", "1"},
+      {"sample", db, "--smoothness", "3"},
+      {"sample", db, "--blend", "mixed"},
+      {"sample", db, "--memory", "much"},
+      {"resample", db, out, "--bands", "colour"},
+      {"resample", db, out, "--step", "0"},
+      {"query", db, "--eye", "0", "0", "9", "--look", "9", "0", "0", "--size", "1e300", "720"},
+      {"list", db, "--threads", "-1"}};
   for (const Words& words : wrong) {
     const Outcome o = run(words);
     EXPECT_EQ(o.code, 2) << Json(words).dump();
@@ -81,6 +83,27 @@ TEST_F(Verbs, NumbersOutOfTheirRangeAreWrongUsage) {
     }
     EXPECT_EQ(with("5").code, 0) << Json(words).dump() << ", negative control";
   }
+  // Numbers of either sign.
+  const Words ray{"sight", db, "--from", "500105", "4999895", "2", "--to", "500305", "4999795", "2"};
+  for (const auto& [words, option] : {std::pair{Words{"volume", db}, "--plane"}, {ray, "--refraction"}})
+    for (const char* number : {"nan", "inf", "-5"}) {
+      Words all = words;
+      all.insert(all.end(), {option, number});
+      const bool good = number[0] == '-';
+      const Outcome o = run(all);
+      EXPECT_EQ(o.code, good ? 0 : 2) << Json(all).dump() << o.err;
+      if (!good) {
+        EXPECT_SAYS(o.err, std::string(option) + ": it must be a number");
+      }
+    }
+}
+
+// What a script gives whose variable is not set.
+TEST_F(Verbs, AnEmptyNameOrPlaceIsNoneAtAll) {
+  const std::string db = hill_database(), tif = in_directory("hills.tif");
+  EXPECT_SAYS(complaint(run({"volume", db, "--plane", "0", "--polygon", ""})), "polygon");
+  EXPECT_SAYS(complaint(run({"query", db, "--error", "1", "--polygon", ""})), "polygon");
+  EXPECT_EQ(run({"import", db, tif, "--replace", ""}).code, 2);
 }
 
 TEST_F(Verbs, ImportTellsProgramsWhatItDid) {
@@ -136,6 +159,9 @@ TEST_F(Verbs, QueryHasTheKeysThatProgramsRelyOn) {
   EXPECT_EQ(missing_keys(q, {"patches", "by_level", "by_grid", "bound_max", "bound_inside", "error_available",
                              "cost"}),
             Words{});
+  const Json nothing =
+      json({"query", db, "--error", "0", "--extent", "0", "0", "1", "1", "--list", "--json"});
+  EXPECT_EQ(nothing["list"], Json::array());
   EXPECT_EQ(missing_keys(q["cost"], {"nodes", "boxes", "patches", "bytes", "seconds"}), Words{});
   const auto n = q["patches"].get<std::size_t>();
   EXPECT_GT(n, 0u);

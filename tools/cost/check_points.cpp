@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "blend/vulkan/vulkan_blend.h"
 #include "db/error.h"
 
 namespace patchwork::cli {
@@ -12,7 +13,7 @@ namespace {
 
 // What an evaluator in float32 may differ by (blend/vulkan/vulkan_blend.h), metres; in double, by rounding.
 double slack(double height, bool float32) {
-  return float32 ? 1e-3 + 1e-6 * std::abs(height) : 1e-9 * (1 + std::abs(height));
+  return float32 ? VulkanBlend::departure(height) : 1e-9 * (1 + std::abs(height));
 }
 
 }  // namespace

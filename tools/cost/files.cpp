@@ -6,16 +6,20 @@
 #include <fstream>
 
 #include "db/error.h"
+#include "tools/bench/bench.h"
 #include "tools/cost/cost.h"
+#include "tools/output_file.h"
 
 namespace patchwork::cli {
 
 namespace {
 
 void write_file(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream out(path, std::ios::binary);
+  OutputFile file(path.string());
+  std::ofstream out(file.name(), std::ios::binary);
   out << text;
   if (!out.flush()) throw Error(path.string(), "it cannot be written", "is the disk full?");
+  file.publish();
 }
 
 Json number(const std::optional<double>& v) { return v ? Json(*v) : Json(); }
@@ -49,6 +53,16 @@ Json json_of(const CostRow& r, double reference) {
   return j;
 }
 
+// RFC 4180: a field that holds what divides fields stands in quotes.
+std::string csv_field(const Json& value) {
+  if (value.is_null()) return "";
+  if (!value.is_string()) return value.dump();
+  std::string text = value.get<std::string>();
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, 1, '"');
+  return '"' + text + '"';
+}
+
 std::string csv_of(const Json& rows) {
   std::string text;
   for (const auto& [key, value] : rows.front().items()) text += (text.empty() ? "" : ",") + key;
@@ -59,7 +73,7 @@ std::string csv_of(const Json& rows) {
     for (const auto& [key, value] : row.items()) {
       if (!first) line += ",";
       first = false;
-      if (!value.is_null()) line += value.is_string() ? value.get<std::string>() : value.dump();
+      line += csv_field(value);
     }
     text += line + "\n";
   }
@@ -83,7 +97,8 @@ std::vector<std::string> write_cost(const CostReport& report, const std::string&
   write_file(to / "cost.json", rows.dump(2) + "\n");
   write_file(to / "cost.csv", csv_of(rows));
   std::vector<std::string> names{"cost.csv", "cost.json"};
-  const auto plots = draw_cost(report, folder);
+  const WorkFolder scratch({});
+  const auto plots = draw_cost(report, scratch.path(""));
   for (const auto& [name, svg] : plots) write_file(to / (name + ".svg"), svg), names.push_back(name + ".svg");
   write_file(to / "index.html", cost_page(report, plots));
   names.push_back("index.html");

@@ -116,9 +116,13 @@ std::string table_of_rows(const CostReport& c) {
 }
 
 std::string verdict(const CostReport& c) {
+  const auto bounded =
+      std::count_if(c.rows.begin(), c.rows.end(), [](const CostRow& r) { return r.bound.has_value(); });
   if (c.beyond() == 0)
-    return fmt::format("<p>Every measured error keeps to its bound: {} settings at {} points each.</p>\n",
-                       c.rows.size(), c.points);
+    return fmt::format(
+        "<p>Every measured error keeps to its bound: {} settings, at {} points each, or at the pixels of a "
+        "frame.</p>\n",
+        bounded, c.points);
   return fmt::format(
       "<p class=\"bad\">{} measured errors are beyond their bounds: some grid is less accurate than it "
       "was said to be.</p>\n",

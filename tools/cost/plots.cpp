@@ -59,9 +59,9 @@ class Script {
   }
   std::vector<std::pair<std::string, std::string>> draw() const {
     const std::string script = scratch_ + "/plots.gnuplot";
-    std::ofstream(script) << text_;
+    std::ofstream out(script);
+    if (!(out << text_).flush()) throw Error(script, "it cannot be written", "is the disk full?");
     run_process({"gnuplot", script}, "gnuplot-nox");
-    std::filesystem::remove(script);
     std::vector<std::pair<std::string, std::string>> all;
     for (const std::string& name : names_) {
       std::ifstream in(path(name), std::ios::binary);

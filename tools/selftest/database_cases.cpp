@@ -141,8 +141,15 @@ std::vector<Verdict> changes(Trial& t) {
     return all;
   };
   if (t.db.file_bytes() > kMostBytes) return leave_out("the file is too large to be copied");
-  const Copy copy(t);
-  Database db = copy.open();
+  std::optional<Copy> copied;
+  std::optional<Database> opened;
+  try {
+    opened.emplace(copied.emplace(t).open());
+  } catch (const std::exception& e) {  // a writer moved what stood in the log while it was copied
+    return leave_out(fmt::format("it could not be copied as it stands: {}", e.what()));
+  }
+  const Copy& copy = *copied;
+  Database& db = *opened;
   const std::string before = db.content_hash();
   if (before != t.db.content_hash()) return leave_out("the database is being changed");
   insert(db, copy, {0, 1, 2});

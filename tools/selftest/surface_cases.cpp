@@ -75,9 +75,10 @@ double worst_difference(const Heights& cpu, const Heights& card) {
     if ((cpu.source[k] == 0) != (card.source[k] == 0)) return INFINITY;
     if (cpu.source[k] == 0) continue;
     if (!std::isfinite(card.height[k]) || !std::isfinite(card.bound[k])) return INFINITY;
-    const double limit = 1e-3 + 1e-6 * std::abs(cpu.height[k]);
-    worst = std::max({worst, std::abs(cpu.height[k] - card.height[k]) / limit,
-                      std::abs(cpu.bound[k] - card.bound[k]) / limit});
+    const double limit = VulkanBlend::departure(cpu.height[k]);
+    worst =
+        std::max({worst, std::abs(cpu.height[k] - card.height[k]) / limit,
+                  std::abs(cpu.bound[k] + VulkanBlend::departure(card.height[k]) - card.bound[k]) / limit});
   }
   return worst;
 }

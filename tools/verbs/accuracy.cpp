@@ -31,8 +31,9 @@ double step_of(const Database& db, const Extent& e, double asked) {
   return std::max(finest_step(db, e), std::sqrt((e.xmax - e.xmin) * (e.ymax - e.ymin) / kMostPixels));
 }
 
-void write_map(const Evaluator& surface, const Database& db, const Raster& r, const Options& o,
-               const Common& common) {
+// Without data outside the area.
+void write_map(const Evaluator& surface, const Database& db, const Raster& r, const Area& area,
+               const Options& o, const Common& common) {
   SurfaceRaster d{.width = r.width, .height = r.height, .crs_wkt = db.crs()};
   d.geotransform = {r.xmin, r.step, 0, r.ymax, 0, -r.step};
   d.bands = {{.name = "bound", .unit = "m"}};
@@ -42,6 +43,13 @@ void write_map(const Evaluator& surface, const Database& db, const Raster& r, co
       o.map, d,
       [&](int factor, int row, int rows, std::span<float* const> bands) {
         resampler.rows(factor, row, rows, bands);
+        if (!area.inside) return;
+        const RasterFrame f = r.frame(factor);
+        const int width = (r.width + factor - 1) / factor;
+        for (int y = 0; y < rows; ++y)
+          for (int x = 0; x < width; ++x)
+            if (!area.inside(f.at(x, row + y)))
+              bands[0][std::size_t(y) * std::size_t(width) + std::size_t(x)] = NAN;
       },
       [](double) {});
 }
@@ -84,7 +92,7 @@ void run(const Options& o, const Common& common) {
   const Database db = open_filled(o.database, common);
   refuse_overwriting(o.database, {o.map});
   const Region region = o.region.region();
-  const bool whole = o.region.extent.empty() && o.region.polygon.empty();
+  const bool whole = !o.region.given();
   const Extent extent = whole ? db.extent() : region.bounds();
   const Raster raster = Raster::covering(extent, step_of(db, extent, o.step));
   const Extraction x = extract(
@@ -97,7 +105,7 @@ void run(const Options& o, const Common& common) {
   area.progress = [&](double share) { bar->show(share); };
   const Accuracy a = accuracy_over(*surface, area, db.grids().size());
   bar.reset();
-  if (!o.map.empty()) write_map(*surface, db, raster, o, common);
+  if (!o.map.empty()) write_map(*surface, db, raster, area, o, common);
   common.json ? print(json_of(a, db, raster.step)) : print_text(a, db);
 }
 

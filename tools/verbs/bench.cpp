@@ -68,6 +68,7 @@ void add_bench(CLI::App& app, Common& common) {
   auto o = std::make_shared<Options>();
   CLI::App* v = verb(app, common, "bench", "the project's own benchmarks, with peers beside it");
   v->get_option("--threads")->description("threads of both sides; 0 means 2");
+  v->get_option("--memory")->description("of GDAL's cache of raster blocks; ours has its default");
   v->add_option("NAME", o->name, "what to measure")->required()->check(CLI::IsMember(names()));
   v->add_option("--file", o->bench.file,
                 "heights to use: to code, integers (codec), to evaluate (blend), to fly over (render)")

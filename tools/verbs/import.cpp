@@ -178,7 +178,8 @@ void add_import(CLI::App& app, Common& common) {
       ->check(zero_or_more());
   v->add_option("--name", o->name,
                 "of the grid; else that of the grid it replaces, else the file's name without its ending");
-  v->add_option("--replace", o->replace, "a grid of the database that goes out as this one comes in");
+  v->add_option("--replace", o->replace, "a grid of the database that goes out as this one comes in")
+      ->check(not_empty());
   v->add_option(
        "--tolerance", o->tolerance,
        "metres by which a stored height may differ from the file's; 0 keeps integers exactly, and other "

@@ -16,7 +16,8 @@ struct Options {
   std::optional<double> error;
   bool strict = false, list = false;
   RegionOptions region;
-  std::vector<double> eye, look, size{1280, 720};
+  std::vector<double> eye, look;
+  std::vector<int> size{1280, 720};
   double fov = 60, pixel_error = 1;
   std::size_t patches = 0, bytes = 0;  // budgets; 0: none
   double milliseconds = 0;
@@ -40,8 +41,8 @@ ViewCut view_of(const Database& db, const Options& o) {
   return over_terrain_of(db, {.eye = {o.eye[0], o.eye[1], o.eye[2]},
                               .look = {o.look[0], o.look[1], o.look[2]},
                               .fov_degrees = o.fov,
-                              .width = int(o.size[0]),
-                              .height = int(o.size[1]),
+                              .width = o.size[0],
+                              .height = o.size[1],
                               .pixel_error = o.pixel_error,
                               .in_space = o.cone,
                               .strict = o.strict});
@@ -85,7 +86,7 @@ struct Question {
 
 Question question(const Database& db, const Options& o, const Common& common) {
   const bool view = !o.eye.empty();
-  if (view && (o.error || !o.region.extent.empty() || !o.region.polygon.empty()))
+  if (view && (o.error || o.region.given()))
     throw CLI::ValidationError("--eye", "a view brings its own error and region");
   if (!o.field.empty() && (view || o.error || o.budgeted()))
     throw CLI::ValidationError("--field", "a field brings its own error, and has no budget");
@@ -219,6 +220,7 @@ void run(const Options& o, const Common& common) {
          {"error_available", x.error_available}};
   if (o.budgeted()) j["within_budget"] = asked.kept;
   j["cost"] = json_of(x.cost);
+  if (o.list) j["list"] = Json::array();
   if (o.list)
     for (const PatchId id : x.patches) j["list"].push_back(json_of(db, id));
   print(j);
@@ -243,7 +245,7 @@ void add_query(CLI::App& app, Common& common) {
   v->add_option("--size", o->size, "of the view: width height, pixels")
       ->needs(eye)
       ->expected(2)
-      ->check(above_zero())
+      ->check(CLI::Range(1, 1 << 20))
       ->capture_default_str();
   auto* pixels =
       v->add_option("--pixel-error", o->pixel_error, "largest error that you accept on the screen, pixels")

@@ -127,6 +127,7 @@ class Sampler {
       x_.push_back(values[0]), y_.push_back(values[1]);
       if (x_.size() == kBatch) flush();
     }
+    expect_end_of(in);
     flush();
   }
 
@@ -138,7 +139,7 @@ class Sampler {
   }
 
  private:
-  // Columns named x and y, or easting and northing; where there are none, the first two.
+  // Columns named x and y, or easting and northing; where none is and there are but two, these.
   bool header(std::string_view line) {
     if (has_header_) return false;
     int at[2] = {-1, -1}, column = 0;
@@ -150,7 +151,7 @@ class Sampler {
       if (axis >= 0 && at[axis] < 0) at[axis] = column;
     }
     if (column < 2) return false;
-    if ((at[0] < 0) != (at[1] < 0))
+    if ((at[0] < 0) != (at[1] < 0) || (at[0] < 0 && column > 2))
       throw Error("header", fmt::format("it names no column {}", at[0] < 0 ? 'x' : 'y'),
                   "name the columns x and y, or easting and northing");
     if (at[0] >= 0) std::copy(at, at + 2, columns_);

@@ -47,6 +47,7 @@ std::vector<Asked> read_lines(std::istream& in) {
       throw Error("line " + std::to_string(number), "it does not start with six numbers x y h x y h");
     all.push_back(a);
   }
+  expect_end_of(in);
   return all;
 }
 
@@ -166,7 +167,9 @@ void add_sight(CLI::App& app, Common& common) {
                        ->check(above_zero())
                        ->needs(from)
                        ->excludes(to);
-  v->add_option("--azimuth", o->azimuth, "of a ray, degrees clockwise from the y axis")->needs(distance);
+  v->add_option("--azimuth", o->azimuth, "of a ray, degrees clockwise from the y axis")
+      ->check(finite())
+      ->needs(distance);
   v->add_option("--elevation", o->elevation, "of a ray, degrees above the horizontal")
       ->check(CLI::Range(-89.9, 89.9))
       ->needs(distance);
@@ -174,6 +177,7 @@ void add_sight(CLI::App& app, Common& common) {
   v->add_flag_callback(
       "--flat", [o] { o->air.curved = false; }, "without the earth's curvature");
   v->add_option("--refraction", o->air.refraction, "curvature of light over the earth's")
+      ->check(finite())
       ->capture_default_str();
   v->add_option("--radius", o->air.radius, "of the earth, metres")
       ->check(above_zero())

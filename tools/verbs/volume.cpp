@@ -61,7 +61,7 @@ class Surface {
 
 // What the two have in common, where no region is asked for.
 Extent extent_of(const Database& db, const Options& o) {
-  if (!o.region.extent.empty() || !o.region.polygon.empty()) return o.region.region().bounds();
+  if (o.region.given()) return o.region.region().bounds();
   Extent e = db.extent();
   for (const auto* names : {&o.before, &o.after})
     if (!names->empty()) e = e.common(bounds_of(db, ids_of(db, *names)));
@@ -138,6 +138,7 @@ void add_volume(CLI::App& app, Common& common) {
   v->add_option("--after", o->after, "surveys by name: the upper surface; else the best of all there are")
       ->delimiter(',');
   v->add_option("--plane", o->plane, "instead of --before: a level plane at this height, metres")
+      ->check(finite())
       ->excludes(before);
   o->region.add_to(*v, true);
   v->add_option("--step", o->step, "of the pixels that are summed, metres; else the grids' finest step")

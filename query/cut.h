@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "db/database.h"
@@ -89,5 +90,7 @@ ViewCut over_terrain_of(const Database& db, ViewCut cut);
 /// The corners of a view's region, counterclockwise; fewer than three where it sees nothing. Throws as
 /// make_surface does.
 std::vector<Point> footprint(const ViewCut& cut);
+/// True in the region that has these corners, and on its rim.
+bool sees(std::span<const Point> footprint, Point p);
 
 }  // namespace patchwork

@@ -133,6 +133,12 @@ std::vector<Point> footprint(const ViewCut& v) {
   return convex_hull(std::move(points));
 }
 
+bool sees(std::span<const Point> corners, Point p) {
+  for (std::size_t k = 0; k < corners.size(); ++k)
+    if (turn(corners[k], corners[(k + 1) % corners.size()], p) < 0) return false;
+  return corners.size() >= 3;
+}
+
 ViewCut over_terrain_of(const Database& db, ViewCut v) {
   HeightRange all;
   for (const Grid& g : db.grids()) all.add(g.info.surface_heights());

@@ -83,7 +83,7 @@ CLI::Validator zero_or_more() {
           "0 or more"};
 }
 
-void SurfaceOptions::add_to(CLI::App& v) {
+void SurfaceOptions::add_blend_to(CLI::App& v) {
   v.add_option("--error", error, "largest error that you accept, metres; 0 means the best there is")
       ->check(zero_or_more());
   v.add_option("--smoothness", smoothness, "k: derivatives that are continuous")
@@ -92,6 +92,10 @@ void SurfaceOptions::add_to(CLI::App& v) {
   v.add_option("--blend", blend, "how patches are composed")
       ->check(CLI::IsMember({"priority", "weighted"}))
       ->capture_default_str();
+}
+
+void SurfaceOptions::add_to(CLI::App& v) {
+  add_blend_to(v);
   v.add_option("--engine", engine, "where the surface is evaluated")
       ->check(CLI::IsMember({"cpu", "vulkan"}))
       ->capture_default_str();

@@ -86,6 +86,7 @@ struct SurfaceOptions {
   std::string blend = "priority", engine = "cpu";
   bool strict = false;
   void add_to(CLI::App& verb);
+  void add_blend_to(CLI::App& verb);  ///< --error, --smoothness and --blend alone
   BlendOptions blend_options() const;
 };
 

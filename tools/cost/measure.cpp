@@ -262,18 +262,11 @@ class Bench {
   std::vector<double> pixels_a_metre(const ViewCut& one_pixel) const {
     const std::vector<Point> corners = footprint(one_pixel);
     const auto surface = make_surface(one_pixel);
-    const auto sees = [&](Point at) {
-      for (std::size_t c = 0; c < corners.size(); ++c) {
-        const Point &p = corners[c], &q = corners[(c + 1) % corners.size()];
-        if (turn(p, q, at) < 0) return false;
-      }
-      return corners.size() >= 3;
-    };
     std::vector<double> scale;
     for (std::size_t k = 0; k < points_->size(); ++k) {
       const Point at{points_->x()[k], points_->y()[k]};
       const double metres = surface->at(at);
-      scale.push_back(sees(at) && metres > 0 ? 1 / metres : -1);
+      scale.push_back(sees(corners, at) && metres > 0 ? 1 / metres : -1);
     }
     return scale;
   }

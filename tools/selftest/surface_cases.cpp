@@ -130,13 +130,8 @@ Verdict bound_is_what_was_asked(Trial& t) {
     const Heights h = heights_of(t.db, x.patches, points);
     for (std::size_t k = 0; k < points.size(); ++k) {
       const Point p{points.x[k], points.y[k]};
-      bool inside = true;
-      for (std::size_t c = 0; c < seen.size(); ++c) {
-        const Point &a = seen[c], &b = seen[(c + 1) % seen.size()];
-        inside &= turn(a, b, p) > 0;
-      }
       const double asked = cut->at(p);
-      if (!inside || (!uniform && seen.size() < 3) || !(asked > 0) || !offers(t.db, p, asked)) continue;
+      if ((!uniform && !sees(seen, p)) || !(asked > 0) || !offers(t.db, p, asked)) continue;
       ++v.tries;
       const double part = (h.bound[k] - kHairline * x.bound_max) / asked;
       v.worst = std::max(v.worst, std::isnan(part) ? INFINITY : part);  // no answer at all

@@ -23,9 +23,7 @@ struct Options {
   double azimuth = 0, elevation = 0, distance = 0;
   bool absolute = false;
   Air air;
-  double error = 0;
-  int smoothness = 0;
-  std::string blend = "priority";
+  SurfaceOptions surface;
 };
 
 // What was asked for: two ends, or an end and a direction; z of an end as it was given.
@@ -130,11 +128,8 @@ void run(const Options& o, const Common& common) {
   std::vector<Asked> rays = asked(o);
   Json all = Json::array();
   if (!rays.empty()) {
-    const Extraction x = extract(db, {.error = o.error, .region = Region::inside(bounds_of(rays))});
-    const SightLines lines(
-        db, x.patches,
-        {.smoothness = o.smoothness,
-         .composition = o.blend == "weighted" ? Composition::weighted : Composition::priority});
+    const Extraction x = extract(db, {.error = o.surface.error, .region = Region::inside(bounds_of(rays))});
+    const SightLines lines(db, x.patches, o.surface.blend_options());
     if (!o.absolute) raise(rays, lines.surface());
     for (std::size_t from = 0; from < rays.size(); from += kBatch) {
       std::vector<SightRay> some;
@@ -182,14 +177,7 @@ void add_sight(CLI::App& app, Common& common) {
   v->add_option("--radius", o->air.radius, "of the earth, metres")
       ->check(above_zero())
       ->capture_default_str();
-  v->add_option("--error", o->error, "largest error that you accept, metres; 0 means the best there is")
-      ->check(zero_or_more());
-  v->add_option("--smoothness", o->smoothness, "k: derivatives that are continuous")
-      ->check(CLI::Range(0, 2))
-      ->capture_default_str();
-  v->add_option("--blend", o->blend, "how patches are composed")
-      ->check(CLI::IsMember({"priority", "weighted"}))
-      ->capture_default_str();
+  o->surface.add_blend_to(*v);
   v->add_flag("--json", common.json, "one JSON document on stdout");
   v->callback([o, &common] { run(*o, common); });
 }

@@ -27,7 +27,7 @@ struct Machine {
   }
 };
 
-TEST(RoundsTest, OfEachTheMiddleHalfCounts) {
+TEST(RoundsTest, OfEachTheFastestQuarterCounts) {
   Machine machine;
   const std::vector<MeasuredRun> all{machine.run(0), machine.run(1), machine.run(2)};
   double share = 0;
@@ -38,23 +38,20 @@ TEST(RoundsTest, OfEachTheMiddleHalfCounts) {
   EXPECT_GT(share, 0.9);
   for (const Stages& ms : times) {
     const std::vector<double> total = ms.total();
-    EXPECT_EQ(total.size(), 21u);
+    EXPECT_EQ(total.size(), 10u);
     EXPECT_EQ(ms.query.size(), total.size());
     EXPECT_TRUE(ms.blend.empty()) << "there was nothing to blend";
-    for (const double t : total) {  // negative control: they take 10 to 20
-      EXPECT_GT(t, 12);
-      EXPECT_LT(t, 18);
-    }
+    for (const double t : total) EXPECT_LT(t, 13);  // negative control: they take 10 to 20
   }
 }
 
-TEST(RoundsTest, OfFewRunsThreeOrFourCount) {
+TEST(RoundsTest, OfFewRunsThreeCount) {
   for (const int least : {1, 2, 3, 4, 5, 6, 8}) {
     Machine machine;
     const std::vector<MeasuredRun> all{machine.run(0)};
     const std::size_t counted =
         measure(all, {.least = least, .until = kNoTime, .progress = [](double) {}})[0].query.size();
-    EXPECT_EQ(counted, std::size_t(least == 5 ? 3 : std::min(least, 4))) << least;
+    EXPECT_EQ(counted, std::size_t(std::min(least, 3))) << least;
   }
 }
 

@@ -29,25 +29,24 @@ std::vector<double> sum(const Stages& ms, std::vector<double> Stages::*without) 
 }
 
 // The runs that count, fastest first.
-std::vector<std::size_t> middle_half(const Stages& ms) {
+std::vector<std::size_t> fastest_quarter(const Stages& ms) {
   const std::vector<double> total = ms.total();
   std::vector<std::size_t> runs(total.size());
   std::iota(runs.begin(), runs.end(), std::size_t{0});
   std::stable_sort(runs.begin(), runs.end(),
                    [&](std::size_t a, std::size_t b) { return total[a] < total[b]; });
-  const std::size_t spare = runs.size() - std::min(runs.size(), kLeastThatCount);
-  const auto off = std::ptrdiff_t(std::min(runs.size() / 4, spare / 2));  // each end
-  return {runs.begin() + off, runs.end() - off};
+  runs.resize(std::min(runs.size(), std::max(runs.size() / 4, kLeastThatCount)));
+  return runs;
 }
 
 bool sure(const Stages& ms) {
   const std::vector<double> total = ms.total();
-  const std::vector<std::size_t> runs = middle_half(ms);
+  const std::vector<std::size_t> runs = fastest_quarter(ms);
   return total[runs.back()] <= (1 + kSure) * total[runs.front()];
 }
 
-void keep_middle_half(Stages& ms) {
-  const std::vector<std::size_t> runs = middle_half(ms);
+void keep_fastest_quarter(Stages& ms) {
+  const std::vector<std::size_t> runs = fastest_quarter(ms);
   for (const auto stage : kStages) {
     if ((ms.*stage).empty()) continue;
     std::vector<double> kept;
@@ -78,7 +77,7 @@ class Visits {
   }
   std::vector<Stages> take() {
     std::vector<Stages> times;
-    for (Setting& s : settings_) keep_middle_half(s.ms), times.push_back(std::move(s.ms));
+    for (Setting& s : settings_) keep_fastest_quarter(s.ms), times.push_back(std::move(s.ms));
     return times;
   }
 

@@ -28,9 +28,9 @@ struct Rounds {
 /// Visits each `least` times, and on until what counts of each is known to kSure of itself or the time has
 /// come. What takes longer is visited less often, by the root of its time, as makes the most of the time for
 /// all medians (Neyman 1934); and in another order each time, so that a slower moment of the machine is not
-/// always that of the same neighbours. Of each, the middle half of its runs counts and is given out, three at
-/// least: a machine that others use too has faster and slower minutes, which all settings meet alike. So
-/// medians keep to each other's proportions, where what was fastest depends on who met the best moment.
+/// always that of the same neighbours. Of each, the fastest quarter of its runs counts and is given out,
+/// three at least: what others do on the machine only ever slows a run, and spread over all minutes each
+/// setting meets calm moments.
 std::vector<Stages> measure(std::span<const MeasuredRun> all, const Rounds& rounds);
 inline constexpr double kSure = 0.02;  ///< between the fastest and the slowest that count
 

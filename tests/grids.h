@@ -53,6 +53,11 @@ inline GridFile of_terrain(GridFile file, std::function<double(double, double)> 
   return file;
 }
 
+/// Hills of 40 m with detail down to a metre.
+inline double rough_terrain(double x, double y) {
+  return 40 * std::sin(x / 170) * std::cos(y / 130) + 5 * std::sin(x / 21 + y / 37) + std::sin(x * 1.7 + y);
+}
+
 /// Literal heights, rows divided by '/': "0 1 0 / 1 x 1 / 0 1 0"; x is a hole.
 inline GridFile heights(const std::string& text, GridFile file = {}) {
   auto rows = std::make_shared<std::vector<std::vector<double>>>(1);

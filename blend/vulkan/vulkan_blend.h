@@ -1,6 +1,7 @@
 // The blend on the graphics card: the surface and the bound of blend.h, for rasters, points and tiles.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <span>

@@ -17,10 +17,6 @@
 namespace patchwork {
 namespace {
 
-double rough(double x, double y) {
-  return 40 * std::sin(x / 170) * std::cos(y / 130) + 5 * std::sin(x / 21 + y / 37) + std::sin(x * 1.7 + y);
-}
-
 // Small surveys at any angle over each other, some with holes, two of equal frame.
 std::vector<GridFile> surveys(int n, std::mt19937_64& random) {
   const auto uniform = [&](double a, double b) {
@@ -36,7 +32,7 @@ std::vector<GridFile> surveys(int n, std::mt19937_64& random) {
     file.accuracy = uniform(0.1, 3);
     file.pixel_is_area = random() % 2;
     const double lift = k;
-    file = of_terrain(file, [lift](double x, double y) { return rough(x, y) + lift; });
+    file = of_terrain(file, [lift](double x, double y) { return rough_terrain(x, y) + lift; });
     if (k % 3 == 1)
       file.at = [at = file.at, w = file.width](int i, int j) {
         return i < w / 3 && j > 8 ? kHole : at(i, j);
@@ -221,12 +217,13 @@ TEST(Change, TellsOfPatchesThatChangedBesideTheGrid) {
   Database db = folder.database();
   const auto survey = [](double west) {
     return of_terrain(
-        {.width = 330, .height = 300, .geotransform = {west, 4, 0, 1200, 0, -4}, .accuracy = 0.1}, rough);
+        {.width = 330, .height = 300, .geotransform = {west, 4, 0, 1200, 0, -4}, .accuracy = 0.1},
+        rough_terrain);
   };
-  folder.add(
-      db,
-      of_terrain({.width = 90, .height = 60, .geotransform = {0, 20, 0, 1200, 0, -20}, .accuracy = 2}, rough),
-      "base");
+  folder.add(db,
+             of_terrain({.width = 90, .height = 60, .geotransform = {0, 20, 0, 1200, 0, -20}, .accuracy = 2},
+                        rough_terrain),
+             "base");
   folder.add(db, survey(-200), "west");
   const std::uint64_t before = db.version();
   std::set<std::size_t> live;
@@ -273,7 +270,7 @@ TEST(InsertRemove, GivesBackTheDatabaseThatNeverSawTheGrid) {
 TEST(InsertRemove, DormantPatchesWakeUp) {
   const GridFolder folder;
   Database db = folder.database();
-  GridFile file = of_terrain({.width = 120, .height = 100, .accuracy = 4}, rough);
+  GridFile file = of_terrain({.width = 120, .height = 100, .accuracy = 4}, rough_terrain);
   folder.add(db, file, "old");
   const std::size_t live = count_live(db);
   file.accuracy = 0.5;
@@ -332,7 +329,7 @@ TEST(ReadSamples, GivesBackTheFilesSamplesToTheLastBit) {
   for (const GDALDataType type : {GDT_Int16, GDT_Float32}) {
     const GridFolder folder;
     Database db = folder.database();
-    GridFile file = of_terrain({.width = 150, .height = 131, .type = type}, rough);
+    GridFile file = of_terrain({.width = 150, .height = 131, .type = type}, rough_terrain);
     file.at = [at = file.at, type](int i, int j) {
       if ((i > 30 && i < 60 && j > 40) || (i % 7 == 0 && j % 5 == 0)) return kHole;
       return type == GDT_Int16 ? std::round(at(i, j))
@@ -364,7 +361,7 @@ TEST(ReadSamples, GivesBackTheFilesSamplesToTheLastBit) {
 TEST(Tolerance, EntersTheBoundAndIsKept) {
   const GridFolder folder;
   Database db = folder.database(), exact = folder.database("exact");
-  const GridFile file = of_terrain({.width = 150, .height = 131, .accuracy = 0.2}, rough);
+  const GridFile file = of_terrain({.width = 150, .height = 131, .accuracy = 0.2}, rough_terrain);
   const ImportReport r = folder.add(db, file, "grid", {.tolerance = 0.3});
   folder.add(exact, file, "grid");
   EXPECT_EQ(r.quantisation, 0.3);

@@ -1,5 +1,4 @@
-// A database as one thing: the same for every order of insertion, what it was after a failure, and refused
-// where it is damaged.
+// A database as one thing: what it was after a failure, and refused where it is damaged.
 #include "db/database.h"
 
 #include <fmt/format.h>
@@ -9,179 +8,28 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <nlohmann/json.hpp>
-#include <numeric>
-#include <random>
 
 #include "db/codec.h"
 #include "tests/db/database_files.h"
 #include "tests/db/databases.h"
 #include "tests/grids.h"
-#include "tests/hard_case.h"
-#include "tests/seed.h"
 
 namespace patchwork {
 namespace {
-
-double rough(double x, double y) {
-  return 40 * std::sin(x / 170) * std::cos(y / 130) + 5 * std::sin(x / 21 + y / 37) + std::sin(x * 1.7 + y);
-}
 
 bool says(const std::string& text, const std::string& part) {
   EXPECT_NE(text.find(part), std::string::npos) << text;
   return true;
 }
 
-// --- OrderPermutations.
-
-// Overlapping surveys, rotated, some with holes, two of equal frame and one constant.
-std::vector<GridFile> overlapping(int n, int side, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  const auto uniform = [&](double a, double b) {
-    return std::uniform_real_distribution<double>(a, b)(random);
-  };
-  std::vector<GridFile> files;
-  for (int k = 0; k < n; ++k) {
-    GridFile file{.width = side + int(random() % 12), .height = side + int(random() % 12)};
-    const double step = uniform(5, 9);
-    file.geotransform = k == 1 ? files[0].geotransform
-                               : rotated(uniform(-90, 90), uniform(-90, 90), uniform(-180, 180), step, step);
-    if (k == 1) file.width = files[0].width, file.height = files[0].height;
-    file.accuracy = k < 2 ? 1 : uniform(0.2, 3);
-    const double lift = k;
-    file = of_terrain(file, [lift](double x, double y) { return rough(x, y) + lift; });
-    if (k % 3 == 2)
-      file.at = [at = file.at, side](int i, int j) {
-        return i > side / 2 && j > side / 2 ? kHole : at(i, j);
-      };
-    if (k == 3) file.at = [](int, int) { return 7.0; };
-    files.push_back(file);
-  }
-  return files;
-}
-
-class Orders {
- public:
-  explicit Orders(const std::vector<GridFile>& files) {
-    for (std::size_t k = 0; k < files.size(); ++k)
-      sources_.push_back(folder_.source(files[k], fmt::format("g{}", k)));
-  }
-  std::string hash(const std::vector<std::size_t>& order) {
-    const std::string name = fmt::format("d{}", count_++);
-    Database db = folder_.database(name);
-    for (const std::size_t k : order) db.import(sources_[k], {.name = fmt::format("g{}", k)});
-    EXPECT_EQ(db.tree().size(), count_live(db));
-    return db.content_hash();
-  }
-  std::string replaced(const GridFile& other, std::size_t k) {
-    sources_[k] = folder_.source(other, "other");
-    std::vector<std::size_t> order(sources_.size());
-    std::iota(order.begin(), order.end(), 0);
-    return hash(order);
-  }
-
- private:
-  GridFolder folder_;
-  std::vector<RasterSource> sources_;
-  int count_ = 0;
-};
-
-// PATCHWORK_TRIALS=200 tries as many shuffles as the design asks for.
-int shuffles() { return test_trials(8); }
-
-// All 720 orders of six grids, a test for each grid that may come first.
-class OrderPermutations : public testing::TestWithParam<int> {};
-
-TEST_P(OrderPermutations, OfSixOverlappingGridsGiveOneHash) {
-  const std::vector<GridFile> files = overlapping(6, 20, test_seed(1));
-  Orders orders(files);
-  std::vector<std::size_t> order(files.size());
-  std::iota(order.begin(), order.end(), 0);
-  const std::string expected = orders.hash(order);
-  std::rotate(order.begin(), order.begin() + GetParam(), order.begin() + GetParam() + 1);
-  int tried = 0;
-  do {
-    ASSERT_EQ(orders.hash(order), expected) << testing::PrintToString(order);
-    ++tried;
-  } while (std::next_permutation(order.begin() + 1, order.end()));
-  EXPECT_EQ(tried, 120);
-  GridFile other = files[2];
-  other.at = [at = other.at](int i, int j) { return at(i, j) + (i == 3 && j == 4); };
-  EXPECT_NE(orders.replaced(other, 2), expected) << "negative control: one other sample";
-  report_law("OrderPermutations", "orders of six overlapping grids", std::uint64_t(tried));
-}
-
-INSTANTIATE_TEST_SUITE_P(First, OrderPermutations, testing::Range(0, 6));
-
-TEST(OrderPermutations, ShufflesOfFortyGridsGiveOneHash) {
-  const std::uint64_t seed = test_seed(2);
-  Orders orders(overlapping(40, 34, seed));
-  std::vector<std::size_t> order(40);
-  std::iota(order.begin(), order.end(), 0);
-  const std::string expected = orders.hash(order);
-  std::mt19937_64 random(seed);
-  for (int n = 0; n < shuffles(); ++n) {
-    std::shuffle(order.begin(), order.end(), random);
-    ASSERT_EQ(orders.hash(order), expected) << testing::PrintToString(order);
-  }
-  report_law("OrderPermutations", "shuffles of forty grids", std::uint64_t(shuffles()));
-}
-
-// --- EqualGrids.
-
-TEST(EqualGrids, TheSameGridTwiceIsThereOnce) {
-  const GridFolder folder;
-  Database db = folder.database();
-  const GridFile file = of_terrain({.width = 60, .height = 50}, rough);
-  folder.add(db, file, "first");
-  const std::string hash = db.content_hash();
-  const ImportReport report = folder.add(db, file, "second");
-  EXPECT_EQ(report.duplicate_of, "first");
-  EXPECT_EQ(report.patches, 0u);
-  EXPECT_EQ(db.grids().size(), 1u);
-  EXPECT_EQ(db.content_hash(), hash);
-  EXPECT_EQ(Database::open(db.path()).content_hash(), hash);
-  EXPECT_EQ(
-      folder.add(db, of_terrain({.width = 60, .height = 50, .accuracy = 0.2}, rough), "third").duplicate_of,
-      "")
-      << "negative control: another accuracy is another grid";
-}
-
-TEST(EqualGrids, EqualFramesWithOtherHeightsHaveOneWinnerWhateverTheOrder) {
-  const GridFile low{.width = 60, .height = 50, .at = [](int, int) { return 10.0; }};
-  const GridFile high{.width = 60, .height = 50, .at = [](int, int) { return 20.0; }};
-  std::vector<std::string> winners, hashes;
-  for (const bool swapped : {false, true}) {
-    const GridFolder folder;
-    Database db = folder.database();
-    folder.add(db, swapped ? high : low, swapped ? "high" : "low");
-    folder.add(db, swapped ? low : high, swapped ? "low" : "high");
-    std::string live;
-    for (const Grid& g : db.grids())
-      each_patch(g, [&](std::size_t k, auto) { live += g.patches[k].dormant() ? "" : g.info.name; });
-    winners.push_back(live), hashes.push_back(db.content_hash());
-  }
-  EXPECT_TRUE(winners[0] == "low" || winners[0] == "high") << winners[0];
-  EXPECT_EQ(winners[0], winners[1]);
-  EXPECT_EQ(hashes[0], hashes[1]);
-}
-
-TEST(EqualGrids, ANameIsGivenOnce) {
-  const GridFolder folder;
-  Database db = folder.database();
-  folder.add(db, heights("1 2 / 3 4"), "name");
-  EXPECT_TRUE(
-      says(refusal_of([&] { folder.add(db, heights("1 2 / 3 5"), "name"); }), "has a grid named name"));
-}
-
 // --- What is stored.
 
 Database two_grids(const GridFolder& folder) {
   Database db = folder.database();
-  folder.add(db, of_terrain({.width = 150, .height = 130, .accuracy = 1}, rough), "coarse");
+  folder.add(db, of_terrain({.width = 150, .height = 130, .accuracy = 1}, rough_terrain), "coarse");
   GridFile fine =
-      of_terrain({.width = 90, .height = 80, .geotransform = rotated(300, -300, 30, 4, 4)}, rough);
+      of_terrain({.width = 90, .height = 80, .geotransform = rotated(300, -300, 30, 4, 4)}, rough_terrain);
   fine.at = [at = fine.at](int i, int j) { return i > 30 && i < 50 && j > 60 ? kHole : at(i, j); };
   folder.add(db, fine, "fine");
   return db;
@@ -280,7 +128,7 @@ TEST(Database, RefreshMovesToTheNewestStateAndSaysWhatChanged) {
 TEST(Database, AReaderLetsGoOfStructureThatNobodyReads) {
   const GridFolder folder;
   Database written = folder.database();
-  folder.add(written, of_terrain({.width = 800, .height = 700}, rough), "large");
+  folder.add(written, of_terrain({.width = 800, .height = 700}, rough_terrain), "large");
   const std::string path = written.path();
   const Database roomy = Database::open(path), tight = Database::open(path, 1 << 10);
   for (const Database* db : {&roomy, &tight}) {
@@ -337,7 +185,7 @@ TEST(Database, AnImportBrokenOffHalfwayLeavesItAsItWas) {
         if (share >= at) throw Stop{};
       }};
       try {
-        folder.add(db, of_terrain({.width = 200, .height = 200}, rough), "stopped", options);
+        folder.add(db, of_terrain({.width = 200, .height = 200}, rough_terrain), "stopped", options);
       } catch (const Stop&) {
         return "";
       }
@@ -348,7 +196,7 @@ TEST(Database, AnImportBrokenOffHalfwayLeavesItAsItWas) {
 
 TEST(Database, ADryRunReportsAndKeepsNothing) {
   expect_unharmed([](const GridFolder& folder, Database& db) {
-    const GridFile file = of_terrain({.width = 200, .height = 200, .accuracy = 0.01}, rough);
+    const GridFile file = of_terrain({.width = 200, .height = 200, .accuracy = 0.01}, rough_terrain);
     const ImportReport dry = folder.add(db, file, "dry", {.dry_run = true});
     EXPECT_GT(dry.patches, 0u);
     EXPECT_EQ(db.grids().size(), 2u);
@@ -532,7 +380,7 @@ TEST(Database, AFileIsTakenAwayOnlyWithoutGrids) {
     EXPECT_TRUE(empty.made_file());
     Database other = folder.database("full");
     EXPECT_FALSE(other.made_file());
-    folder.add(other, of_terrain({.width = 40, .height = 40}, rough), "grid");
+    folder.add(other, of_terrain({.width = 40, .height = 40}, rough_terrain), "grid");
     empty.remove_if_empty(), full.remove_if_empty();
   }
   for (const char* end : {"", "-wal", "-shm"})
@@ -543,7 +391,7 @@ TEST(Database, AFileIsTakenAwayOnlyWithoutGrids) {
 TEST(Database, WhoWritesToAFileThatIsGoneHearsOfIt) {
   const GridFolder folder;
   Database db = folder.database();
-  const GridFile file = of_terrain({.width = 40, .height = 40}, rough);
+  const GridFile file = of_terrain({.width = 40, .height = 40}, rough_terrain);
   folder.add(db, file, "before");
   std::filesystem::remove(db.path());
   EXPECT_TRUE(says(refusal_of([&] { folder.add(db, file, "after"); }), "it was removed"));
@@ -552,7 +400,7 @@ TEST(Database, WhoWritesToAFileThatIsGoneHearsOfIt) {
 TEST(Database, TheFirstGridBringsTheCrsAndOneOfAnotherIsRefused) {
   const GridFolder folder;
   Database db = folder.database();
-  const std::string path = folder.write(of_terrain({.width = 40, .height = 40}, rough), "grid");
+  const std::string path = folder.write(of_terrain({.width = 40, .height = 40}, rough_terrain), "grid");
   const auto add = [&](const char* crs, const std::string& of_database, ImportOptions options) {
     db.import(RasterSource::open(path, {.crs = crs}, of_database), options);
   };

@@ -10,17 +10,14 @@
 namespace patchwork {
 namespace {
 
-double rough(double x, double y) {
-  return 40 * std::sin(x / 170) * std::cos(y / 130) + 5 * std::sin(x / 21 + y / 37) + std::sin(x * 1.7 + y);
-}
-
 class CostModelTest : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new GridFolder;
     db_ = new Database(folder_->database());
-    folder_->add(*db_, of_terrain({.width = 900, .height = 800, .geotransform = {0, 5, 0, 0, 0, -5}}, rough),
-                 "base");
+    folder_->add(
+        *db_, of_terrain({.width = 900, .height = 800, .geotransform = {0, 5, 0, 0, 0, -5}}, rough_terrain),
+        "base");
   }
   static void TearDownTestSuite() { delete db_, delete folder_; }
   static GridFolder* folder_;
@@ -129,7 +126,7 @@ TEST(CostModel, FitLeavesOutCostsThatWouldBeBelowZero) {
 TEST(CostModel, IsKeptInTheDatabaseAndIsNoPartOfItsContent) {
   const GridFolder folder;
   Database db = folder.database();
-  folder.add(db, of_terrain({}, rough), "base");
+  folder.add(db, of_terrain({}, rough_terrain), "base");
   EXPECT_FALSE(saved_model(db));
   const std::string hash = db.content_hash();
   const std::uint64_t version = db.version();
@@ -152,7 +149,7 @@ TEST(CostModel, IsKeptInTheDatabaseAndIsNoPartOfItsContent) {
 TEST(CostModel, OfAnotherMachineOrDamagedIsNotUsed) {
   const GridFolder folder;
   Database db = folder.database();
-  folder.add(db, of_terrain({}, rough), "base");
+  folder.add(db, of_terrain({}, rough_terrain), "base");
   save_model(db, {1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6});
   const std::string sound = *db.remark("cost model");
   const auto with = [&](const std::string& from, const std::string& to) {

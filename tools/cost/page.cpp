@@ -144,7 +144,8 @@ std::string cost_page(const CostReport& c, const std::vector<std::pair<std::stri
   std::string page = kHead;
   page += "<h1>What accuracy costs in time</h1>\n";
   page += fmt::format(
-      "<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of {} runs or more. A machine is not "
+      "<p>{} x {} heights over {} x {} km, on {}, {} threads{}; medians of the fastest quarter of {} runs or "
+      "more. A machine is not "
       "equally fast at all times: beside them settings over generated terrain, the same in every report, "
       "took "
       "{} ms (reference); times of two reports compare by their ratio to it.</p>\n",

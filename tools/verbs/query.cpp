@@ -220,9 +220,10 @@ void run(const Options& o, const Common& common) {
          {"error_available", x.error_available}};
   if (o.budgeted()) j["within_budget"] = asked.kept;
   j["cost"] = json_of(x.cost);
-  if (o.list) j["list"] = Json::array();
-  if (o.list)
+  if (o.list) {
+    j["list"] = Json::array();
     for (const PatchId id : x.patches) j["list"].push_back(json_of(db, id));
+  }
   print(j);
 }
 

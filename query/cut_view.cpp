@@ -60,10 +60,7 @@ class ViewSurface : public CutSurface {
       : corners_(footprint(cut)),
         view_({cut.eye.x, cut.eye.y},
               cut.in_space ? std::max({0.0, cut.eye.z - cut.highest, cut.lowest - cut.eye.z}) : 0,
-              cut.pixel_error * 2 * std::tan(cut.fov_degrees * (M_PI / 360)) / cut.height) {
-    for (std::size_t k = 0; corners_.size() >= 3 && k < corners_.size(); ++k)
-      view_.add_side(corners_[k], corners_[(k + 1) % corners_.size()]);
-  }
+              cut.pixel_error * 2 * std::tan(cut.fov_degrees * (M_PI / 360)) / cut.height, corners_) {}
 
   double at(Point p) const override {
     return view_.slope * std::hypot(p.x - view_.eye.x, p.y - view_.eye.y, view_.above);
@@ -95,9 +92,7 @@ class ViewSurface : public CutSurface {
     return seen.i0 <= d.i1 && d.i0 <= seen.i1 && seen.j0 <= d.j1 && d.j0 <= seen.j1;
   }
 
-  LodHits hits(const LodPage& page, bool inside) const override {
-    return view_.sides == 0 ? LodHits() : view_.hits(page, inside);
-  }
+  LodHits hits(const LodPage& page, bool inside) const override { return view_.hits(page, inside); }
 
  private:
   std::vector<Point> corners_;

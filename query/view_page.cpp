@@ -20,8 +20,9 @@ namespace patchwork {
 namespace {
 
 // What a page's floats are compared with, metres from its origin: wide enough for what floats lose, so that
-// no box is missed. Lengths by kLoss of all that they were made from, tolerances a metre by kHair, which also
-// covers what a frame's shear adds to a patch's range, besides what floats lose of tolerances.
+// no box is missed. Lengths by kLoss, eight roundings of a float, of all that they were made from, tolerances
+// a metre by kHair, which also covers what a frame's shear adds to a patch's range, besides what floats lose
+// of tolerances.
 constexpr double kLoss = 0x1p-21, kHair = 0x1p-16, kRounding = 0x1p-19;
 static_assert(kHair - kRounding >= Frame::kMostShear);
 // Tolerances a metre of distance, and distances, whose squares stay floats; kNothing is what may vanish
@@ -42,7 +43,6 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 using Slots = hn::CappedTag<float, 16>;
 using Sides = hn::CappedTag<float, 8>;
-using Coordinates = hn::CappedTag<double, 8>;
 
 std::uint64_t bits_of(Slots d, hn::Mask<Slots> mask) {
   using Bits = std::conditional_t<(hn::MaxLanes(Slots()) > 8), std::uint16_t, std::uint8_t>;
@@ -53,16 +53,18 @@ std::uint64_t bits_of(Slots d, hn::Mask<Slots> mask) {
   return bits;
 }
 
+// The eye from a page's origin, and what lengths there may have lost.
+struct Eye {
+  float x, y, loss;
+};
+
 // Boxes that meet the region's bounds and whose errors meet the cone. Slots that are not in use count or not.
-std::uint64_t near_enough(const LodPage& page, const PageView& v, float loss) {
+std::uint64_t near_enough(const LodPage& page, const PageView& v, Eye eye) {
   const Slots d;
-  const Point& o = page.origin;
-  const auto less = [&](double a) HWY_ATTR { return hn::Set(d, float(a) - loss); };
-  const auto more = [&](double a) HWY_ATTR { return hn::Set(d, float(a) + loss); };
-  const auto x_low = less(v.eye.x - o.x), x_high = more(v.eye.x - o.x), y_low = less(v.eye.y - o.y),
-             y_high = more(v.eye.y - o.y);
-  const auto bounds_west = less(v.bounds.xmin - o.x), bounds_east = more(v.bounds.xmax - o.x),
-             bounds_south = less(v.bounds.ymin - o.y), bounds_north = more(v.bounds.ymax - o.y);
+  const float x0 = eye.x - eye.loss, x1 = eye.x + eye.loss, y0 = eye.y - eye.loss, y1 = eye.y + eye.loss;
+  const auto x_low = hn::Set(d, x0), x_high = hn::Set(d, x1), y_low = hn::Set(d, y0), y_high = hn::Set(d, y1);
+  const auto bounds_west = hn::Set(d, x0 + v.west), bounds_east = hn::Set(d, x1 + v.east),
+             bounds_south = hn::Set(d, y0 + v.south), bounds_north = hn::Set(d, y1 + v.north);
   const auto k_near = hn::Set(d, v.k_near), k_far = hn::Set(d, v.k_far), height2 = hn::Set(d, v.height2),
              nothing = hn::Set(d, kNothing), zero = hn::Zero(d);
   std::uint64_t met = 0;
@@ -87,24 +89,17 @@ std::uint64_t near_enough(const LodPage& page, const PageView& v, float loss) {
 
 // Of the boxes that are met those that have a corner on the inner side of each side; `inside` are those that
 // have all corners there. Few are left to be asked, so a vector takes the sides of one box.
-void keep_inside(const LodPage& page, const PageView& v, float loss, LodHits& hits) {
+void keep_inside(const LodPage& page, const PageView& v, Eye eye, LodHits& hits) {
   const Sides d;
-  const Coordinates dd;
-  const std::size_t step = hn::Lanes(d), part = hn::Lanes(dd);
-  const std::size_t sides = (v.sides + step - 1) / step * step;  // a vector reads those behind the last, too
-  HWY_ALIGN float most[PageView::kMostSides];
-  for (std::size_t k = 0; k < sides; k += part) {
-    const auto at = hn::Add(hn::Mul(hn::LoadU(dd, &v.nx[k]), hn::Set(dd, page.origin.x)),
-                            hn::Mul(hn::LoadU(dd, &v.ny[k]), hn::Set(dd, page.origin.y)));
-    const hn::Rebind<float, Coordinates> df;
-    hn::StoreU(hn::DemoteTo(df, hn::Sub(hn::LoadU(dd, &v.most[k]), at)), df, most + k);
-  }
+  const std::size_t step = hn::Lanes(d);
+  const auto x = hn::Set(d, eye.x), y = hn::Set(d, eye.y), loss = hn::Set(d, eye.loss);
   std::uint64_t out = 0, not_whole = 0;
-  for (std::size_t k = 0; k < sides; k += step) {
+  for (std::size_t k = 0; k < v.sides; k += step) {  // a vector reads those behind the last, too
     const auto nx_up = hn::LoadU(d, &v.nx_up[k]), nx_down = hn::LoadU(d, &v.nx_down[k]),
                ny_up = hn::LoadU(d, &v.ny_up[k]), ny_down = hn::LoadU(d, &v.ny_down[k]);
-    const auto limit = hn::LoadU(d, most + k);
-    const auto nearly = hn::Add(limit, hn::Set(d, loss)), surely = hn::Sub(limit, hn::Set(d, loss));
+    const auto limit = hn::MulAdd(hn::Add(nx_up, nx_down), x,
+                                  hn::MulAdd(hn::Add(ny_up, ny_down), y, hn::LoadU(d, &v.from_eye[k])));
+    const auto nearly = hn::Add(limit, loss), surely = hn::Sub(limit, loss);
     for (std::uint64_t left = hits.met; left; left &= left - 1) {
       const int s = std::countr_zero(left);
       const auto west = hn::Set(d, page.west[s]), south = hn::Set(d, page.south[s]),
@@ -123,10 +118,14 @@ void keep_inside(const LodPage& page, const PageView& v, float loss, LodHits& hi
 
 }  // namespace
 
-LodHits view_hits(const LodPage& page, const PageView& v, float loss, bool inside) {
-  LodHits hits{near_enough(page, v, loss)};
+LodHits view_hits(const LodPage& page, const PageView& v, bool inside) {
+  const double x = v.eye.x - page.origin.x, y = v.eye.y - page.origin.y;
+  const double furthest = std::abs(x) + std::abs(y) + (page.reach + v.reach);
+  if (!(furthest < v.most_reach)) return {page.used()};
+  const Eye eye{float(x), float(y), float(kLoss * (furthest + (page.reach + v.hair)))};
+  LodHits hits{near_enough(page, v, eye)};
   hits.inside = hits.met;
-  if (!inside && hits.met) keep_inside(page, v, loss, hits);
+  if (!inside && hits.met) keep_inside(page, v, eye, hits);
   return hits;
 }
 
@@ -139,36 +138,41 @@ namespace patchwork {
 
 HWY_EXPORT(view_hits);
 
-PageView::PageView(Point from, double height, double metres_a_metre)
+PageView::PageView(Point from, double height, double metres_a_metre, std::span<const Point> corners)
     : eye(from),
       above(height),
       slope(metres_a_metre),
       k_near(squared(slope < kLeast ? 0 : std::min(slope, kMost) * (1 - kHair))),
       k_far(squared(std::clamp(slope, kLeast, kMost) * (1 + kHair))),
       height2(squared(std::min(above, kMost))) {
-  most.fill(std::numeric_limits<double>::infinity());
+  if (corners.size() > kMostSides) throw std::length_error("a view's region has too many sides");
+  most.fill(std::numeric_limits<double>::infinity()), from_eye.fill(std::numeric_limits<float>::infinity());
+  Extent bounds = Extent::nothing();
+  double far = 0;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const Point &a = corners[k], &b = corners[(k + 1) % corners.size()];
+    add_side(a, b), bounds.add(a);
+    far = std::max(far, std::abs(a.x - eye.x) + std::abs(a.y - eye.y));
+  }
+  west = float(bounds.xmin - eye.x), south = float(bounds.ymin - eye.y);
+  east = float(bounds.xmax - eye.x), north = float(bounds.ymax - eye.y);
+  reach = far + above + 1, most_reach = std::min(kMost, kMost / slope);
+  hair = 0x1p-25 * (std::abs(eye.x) + std::abs(eye.y));
+  // Chosen once and not for every page.
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  if (sides > 0) hits_ = &HWY_DYNAMIC_DISPATCH(view_hits);
 }
 
 void PageView::add_side(Point a, Point b) {
-  if (sides == kMostSides) throw std::length_error("a view's region has too many sides");
   const double length = std::hypot(b.x - a.x, b.y - a.y);
   const double x = (b.y - a.y) / length, y = (a.x - b.x) / length;  // outward
-  nx[sides] = x, ny[sides] = y, most[sides] = std::max(x * a.x + y * a.y, x * b.x + y * b.y);
+  const auto outer = [&](Point from) {
+    return std::max(x * (a.x - from.x) + y * (a.y - from.y), x * (b.x - from.x) + y * (b.y - from.y));
+  };
+  nx[sides] = x, ny[sides] = y, most[sides] = outer({0, 0}), from_eye[sides] = float(outer(eye));
   nx_up[sides] = float(std::max(x, 0.0)), nx_down[sides] = float(std::min(x, 0.0));
   ny_up[sides] = float(std::max(y, 0.0)), ny_down[sides] = float(std::min(y, 0.0));
   ++sides;
-  bounds.add(a), bounds.add(b);
-  for (const Point& p : {a, b}) reach = std::max(reach, std::abs(p.x - eye.x) + std::abs(p.y - eye.y));
-}
-
-LodHits PageView::hits(const LodPage& page, bool inside) const {
-  const Point& o = page.origin;
-  const double away = std::abs(eye.x - o.x) + std::abs(eye.y - o.y);
-  const double furthest = away + (page.reach + (reach + above + 1));
-  if (!(furthest < kMost && slope * furthest < kMost)) return {page.used()};
-  // Coordinates lose far less than floats, but may be far larger.
-  const double made_from = furthest + (page.reach + 0x1p-26 * (std::abs(o.x) + std::abs(o.y)));
-  return HWY_DYNAMIC_DISPATCH(view_hits)(page, *this, float(kLoss * made_from), inside);
 }
 
 }  // namespace patchwork

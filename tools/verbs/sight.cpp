@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
-#include <sstream>
 
 #include "db/error.h"
 #include "tools/cli.h"
+#include "tools/number_lines.h"
 
 namespace patchwork::cli {
 
@@ -33,19 +33,10 @@ struct Asked {
 };
 
 std::vector<Asked> read_lines(std::istream& in) {
+  const NumberLines::Names x{"x", "easting"}, y{"y", "northing"}, h{"h", "z", "height"};
+  NumberLines lines(in, {x, y, h, x, y, h});
   std::vector<Asked> all;
-  std::string line;
-  for (std::size_t number = 1; std::getline(in, line); ++number) {
-    std::replace_if(
-        line.begin(), line.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
-    std::istringstream words(line);
-    Asked a;
-    if ((words >> std::ws).eof() || line[0] == '#') continue;
-    if (!(words >> a.from.x >> a.from.y >> a.from.z >> a.to.x >> a.to.y >> a.to.z))
-      throw Error("line " + std::to_string(number), "it does not start with six numbers x y h x y h");
-    all.push_back(a);
-  }
-  expect_end_of(in);
+  for (double n[6]; lines.next(n);) all.push_back({{n[0], n[1], n[2]}, {n[3], n[4], n[5]}});
   return all;
 }
 

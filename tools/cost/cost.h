@@ -1,6 +1,7 @@
 // What `patchwork cost` measures: rows of knobs, the uniform grid beside them, and what is made of both.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,7 +19,7 @@ struct CostOptions {
   std::string scene;     ///< a file; its camera is that of the views; empty: one over the south-west corner
   int side = 512;        ///< heights along each side of the picture
   int runs = 6;          ///< measured at least: rounds.h says which count
-  double seconds = 270;  ///< that all may take before it stays at `runs`
+  double seconds = 280;  ///< that all may take before it stays at `runs`
   int points = 1 << 17;  ///< at which errors are measured
 };
 
@@ -47,10 +48,11 @@ struct CostRow {
   std::size_t beyond = 0;  ///< points farther from the best than both bounds allow, or without an answer
 };
 
-/// A setting whose facts are known, and how its time is taken.
+/// A setting whose facts are known, and how its time is taken: together with that of those that share `once`,
+/// the same work under the name of another knob.
 struct Measurable {
   CostRow row;
-  MeasuredRun once;
+  std::shared_ptr<const MeasuredRun> once;
 };
 
 /// What a time buys: the finest step of the ladder whose median is at most `ms`.

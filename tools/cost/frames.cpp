@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "render/camera_path.h"
@@ -27,7 +28,11 @@ struct FrameKnob {
   std::string knob, value;
   double pixel_error;
   Tessellation tessellation = Tessellation::hardware;  // these are first frames, whose tiles are all made
-  SceneEffects effects = {};
+  int directions = 0;                                  // of sky light; 0: none
+
+  bool same_work(const FrameKnob& o) const {
+    return pixel_error == o.pixel_error && tessellation == o.tessellation && directions == o.directions;
+  }
 };
 
 std::vector<FrameKnob> all_knobs() {
@@ -35,10 +40,8 @@ std::vector<FrameKnob> all_knobs() {
   for (const double pixels : kFrameErrors) all.push_back({"frame", fmt::format("{:g}", pixels), pixels});
   for (const auto& [name, way] : kTessellations) all.push_back({"tessellation", name, kTessellated, way});
   all.push_back({"sky_directions", "no sky light", kTessellated});
-  for (const int n : kDirections) {
-    all.push_back({"sky_directions", std::to_string(n), kTessellated});
-    all.back().effects.sky = effects::Sky{.directions = n};
-  }
+  for (const int n : kDirections)
+    all.push_back({"sky_directions", std::to_string(n), kTessellated, Tessellation::hardware, n});
   return all;
 }
 
@@ -63,6 +66,8 @@ class Frames {
 
  private:
   Renderer renderer_of(const FrameKnob& k) const {
+    SceneEffects effects;
+    if (k.directions > 0) effects.sky = effects::Sky{.directions = k.directions};
     return Renderer(device_, db_,
                     {.width = scene_.camera.width,
                      .height = scene_.camera.height,
@@ -70,7 +75,7 @@ class Frames {
                      .smoothness = scene_.smoothness,
                      .memory = scene_.memory,
                      .tessellation = k.tessellation,
-                     .effects = k.effects});
+                     .effects = effects});
   }
 
   static void add(const FrameStats& s, Stages& ms) {
@@ -121,7 +126,8 @@ class Frames {
 };
 
 Measurable measurable(const std::shared_ptr<const Frames>& frames, const FrameKnob& k) {
-  return {frames->facts(k), [frames, k](Stages& ms) { frames->once(k, ms); }};
+  return {frames->facts(k),
+          std::make_shared<const MeasuredRun>([frames, k](Stages& ms) { frames->once(k, ms); })};
 }
 
 }  // namespace
@@ -144,8 +150,14 @@ FrameScene frame_scene(const Database& db, const Extent& e, const std::string& f
 std::vector<Measurable> frame_settings(const Database& db, std::shared_ptr<Device> device,
                                        const FrameScene& scene) {
   const auto frames = std::make_shared<const Frames>(db, std::move(device), scene);
+  const std::vector<FrameKnob> knobs = all_knobs();
   std::vector<Measurable> all;
-  for (const FrameKnob& k : all_knobs()) all.push_back(measurable(frames, k));
+  for (const FrameKnob& k : knobs) {
+    const auto same = std::find_if(knobs.begin(), knobs.end(), [&](const auto& o) { return o.same_work(k); });
+    const auto place = std::size_t(same - knobs.begin());
+    all.push_back(place < all.size() ? all[place] : measurable(frames, k));
+    all.back().row.knob = k.knob, all.back().row.value = k.value;
+  }
   return all;
 }
 

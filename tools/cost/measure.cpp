@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <tuple>
+#include <utility>
 
 #include "blend/vulkan/vulkan_blend.h"
 #include "db/error.h"
@@ -54,6 +57,15 @@ struct Setting {
   BlendOptions blend{};
   bool vulkan = false, comparable = true;
   int tile = 64, side = 0, threads = 0;
+
+  bool same_work(const Setting& o) const {
+    const auto all = [](const Setting& s) {
+      return std::tuple(s.unit, s.asked, s.window.xmin, s.window.ymin, s.window.xmax, s.window.ymax, s.db,
+                        s.blend.smoothness, s.blend.composition, s.vulkan, s.vulkan ? s.tile : 0, s.side,
+                        s.threads);
+    };
+    return all(*this) == all(o);
+  }
 };
 
 class Bench {
@@ -86,14 +98,16 @@ class Bench {
     const auto until = start_ + std::chrono::round<std::chrono::steady_clock::duration>(
                                     std::chrono::duration<double>(o_.seconds));
     std::vector<MeasuredRun> runs;
-    for (const Measurable& m : all_) runs.push_back(several(m.once));
-    std::vector<Stages> times =
+    std::map<const MeasuredRun*, std::size_t> place;
+    for (const Measurable& m : all_)
+      if (place.emplace(m.once.get(), runs.size()).second) runs.push_back(several(*m.once));
+    const std::vector<Stages> times =
         measure(runs, {.least = o_.runs, .until = until, .progress = [&](double share) {
                          bar_.show(kGathering + (1 - kGathering) * share);
                        }});
-    for (std::size_t k = 0; k < all_.size(); ++k) {
-      report_.rows.push_back(std::move(all_[k].row));
-      report_.rows.back().ms = std::move(times[k]);
+    for (Measurable& m : all_) {
+      report_.rows.push_back(std::move(m.row));
+      report_.rows.back().ms = times[place[m.once.get()]];
     }
     return std::move(report_);
   }
@@ -225,7 +239,13 @@ class Bench {
 
   void add(const std::vector<Setting>& settings) {
     for (const Setting& s : settings) {
-      all_.push_back({facts(s), [this, s](Stages& ms) { once(s, ms); }});
+      const auto same =
+          std::find_if(done_.begin(), done_.end(), [&](const auto& o) { return o.first.same_work(s); });
+      all_.push_back(same != done_.end() ? all_[same->second]
+                                         : Measurable{facts(s), std::make_shared<const MeasuredRun>(
+                                                                    [this, s](Stages& ms) { once(s, ms); })});
+      all_.back().row.knob = s.knob, all_.back().row.value = s.value;
+      if (same == done_.end()) done_.emplace_back(s, all_.size() - 1);
       bar_.show(std::min(kGathering, kGathering * double(all_.size()) / kAboutSettings));
     }
   }
@@ -401,9 +421,10 @@ class Bench {
       CostRow row{.knob = knob, .value = fmt::format("1:{}", grid_->factor(level)), .unit = unit};
       row.error = grid_->error(level, scale), row.samples = double(side) * side;
       row.bytes = grid_->bytes(level), row.file_bytes = grid_->file_bytes();
-      all_.push_back({std::move(row), [this, level, window, side](Stages& ms) {
-                        ms.fetch.push_back(grid_->read(level, window, side));
-                      }});
+      all_.push_back(
+          {std::move(row), std::make_shared<const MeasuredRun>([this, level, window, side](Stages& ms) {
+             ms.fetch.push_back(grid_->read(level, window, side));
+           })});
     }
   }
 
@@ -424,6 +445,7 @@ class Bench {
   std::unique_ptr<CheckPoints> reference_points_;
   bool frames_drawn_ = false;
   std::vector<Measurable> all_;
+  std::vector<std::pair<Setting, std::size_t>> done_;  // places in all_ of work that is no other's
   CostReport report_;
 };
 

@@ -113,7 +113,7 @@ class Visits {
     left_ -= s.visits++ < rounds_.least;
     unsure_ += s.sure, s.sure = sure(s.ms), unsure_ -= s.sure;
     const std::chrono::duration<double> mean = s.mean();
-    s.due = std::max(s.due, 1.) + std::sqrt(std::max(mean.count(), kLeastSeconds)) * (0.5 + uniform());
+    s.due = std::max(s.due, 1.) + std::pow(std::max(mean.count(), kLeastSeconds), 0.25) * (0.5 + uniform());
   }
 
   static constexpr double kLeastSeconds = 1e-4;

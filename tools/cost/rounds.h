@@ -26,8 +26,9 @@ struct Rounds {
 };
 
 /// Visits each `least` times, and on until what counts of each is known to kSure of itself or the time has
-/// come. What takes longer is visited less often, by the root of its time, as makes the most of the time for
-/// all medians (Neyman 1934); and in another order each time, so that a slower moment of the machine is not
+/// come. What takes longer is visited less often, by the fourth root of its time: by its root would make the
+/// most of the time for all medians together (Neyman 1934), but leave the longest to a few moments; and in
+/// another order each time, so that a slower moment of the machine is not
 /// always that of the same neighbours. Of each, the fastest quarter of its runs counts and is given out,
 /// three at least: what others do on the machine only ever slows a run, and spread over all minutes each
 /// setting meets calm moments.

@@ -54,6 +54,31 @@ RendererOptions resolved(RendererOptions o, const Device::Impl& device) {
   return o;
 }
 
+// Where terrain is without gaps, and convex.
+struct Ground {
+  Frame frame;
+  LatticeRect samples;
+  bool holds(Point p) const {
+    const Point at = frame.to_lattice(p.x, p.y);
+    return samples.i0 <= at.x && at.x <= samples.i1 && samples.j0 <= at.y && at.y <= samples.j1;
+  }
+};
+
+// That of a grid without holes which holds all others, if there is one.
+std::optional<Ground> ground_of(const Database& db) {
+  for (const Grid& g : db.grids()) {
+    if (g.info.holes) continue;
+    const Frame& f = g.info.frame;
+    const LatticeRect own = g.info.shape.footprint();
+    const bool all = std::all_of(db.grids().begin(), db.grids().end(), [&](const Grid& o) {
+      const LatticeRect r = f.lattice_bounds(o.info.frame.corners(o.info.shape.footprint()));
+      return &o == &g || (own.i0 <= r.i0 && r.i1 <= own.i1 && own.j0 <= r.j0 && r.j1 <= own.j1);
+    });
+    if (all) return Ground{f, g.info.shape.samples()};
+  }
+  return {};
+}
+
 bool knowing(const SceneEffects& e) { return e.error || e.source; }
 
 vk::TileStore::Holds holds(const RendererOptions& o) {
@@ -80,6 +105,7 @@ struct Renderer::Impl {
   std::vector<TileDraw> draws, last_draws;
   vk::FrameBlock block{};
   Camera camera;
+  std::optional<Ground> ground;
   bool drawn = false;
   bool holding = false;  // the workers, until none of them reads
 
@@ -97,7 +123,8 @@ struct Renderer::Impl {
         effects(card, db, scene_of(o)),
         commands(card),
         timer(card, 4),
-        counter(make_counter()) {
+        counter(make_counter()),
+        ground(ground_of(db)) {
     if (db.grids().empty()) throw Error(db.path(), "it holds no grid to draw");
   }
 
@@ -132,6 +159,17 @@ struct Renderer::Impl {
     return b;
   }
 
+  // From an eye above terrain without gaps, what a line of sight meets first looks towards the eye.
+  bool hides_what_looks_away(const Selection& selection) const {
+    if (!ground || !ground->holds({camera.eye.x, camera.eye.y})) return false;
+    const double tile = 2 * TileLattice::kCells * lattice.half_cell();
+    const TileKey key{0, std::int32_t(std::floor((camera.eye.x - lattice.origin().x) / tile)),
+                      std::int32_t(std::floor((camera.eye.y - lattice.origin().y) / tile))};
+    const Selection::Leaf* leaf = lattice.contains(key) ? selection.leaf_at(key, 0, 0) : nullptr;
+    const TileCache::Node* node = leaf ? supply.cache().find(leaf->key) : nullptr;
+    return node && !node->empty && camera.eye.z > node->facts.highest + node->facts.error + kNear;
+  }
+
   void submit(FrameStats& stats) {
     const VkCommandBuffer c = commands.begin();
     timer.reset(c);
@@ -143,7 +181,7 @@ struct Renderer::Impl {
     stats.light_texels = effects.light_texels() - texels;
     stats.shadow_dispatches = effects.shadow_dispatches() - shadows;
     stats.sky_dispatches = effects.sky_dispatches() - skies;
-    terrain.use(effects);
+    terrain.use(effects, stats.front_only);
     timer.mark(c);
     stats.dispatches += terrain.record_subdivision(c) + stats.shadow_dispatches + stats.sky_dispatches;
     timer.mark(c);
@@ -209,6 +247,7 @@ FrameStats Renderer::Impl::draw(const Camera& from) {
   make_draws(lattice, selection, supply.cache(), {camera.eye.x, camera.eye.y}, draws,
              [&](const TileKey& key, const TileFacts& facts) { return matter_to(key, facts); });
   stats.tiles_drawn = draws.size();
+  stats.front_only = stats.tiles_stale == 0 && hides_what_looks_away(selection);
   // With the same input the picture is the one that is there.
   if (!drawn || other_look || stats.tiles_made > 0 || now != block || draws != last_draws) {
     terrain.set(now, draws);
@@ -276,6 +315,7 @@ bool Renderer::refresh(Database& db) {
     const bool nothing = db.grids().empty();
     another_lattice = nothing || !impl_->lattice.fits(db);
     if (another_lattice && !nothing) impl_->lattice = TileLattice::over(db);
+    impl_->ground = ground_of(db);
   }
   impl_->supply.release(moved, changed, another_lattice);
   if (moved) impl_->effects.heights_changed(changed);

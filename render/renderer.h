@@ -69,6 +69,7 @@ struct FrameStats {
   std::uint64_t triangles = 0;            ///< 0 where the device does not count
   double pixels_asked = 0, pixels_reached = 0;
   double bound_max = 0;                                   ///< metres: of all heights drawn
+  bool front_only = false;                                ///< what looks away was known to be hidden
   bool redrawn = false;                                   ///< else the picture is that of the frame before
   BlendCounts blended;                                    ///< of the tiles made
   BlockShares blocks;                                     ///< the same: inside are copied, partial blended

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "terrain.glsl"
 
-layout(quads, equal_spacing, ccw) in;
+layout(quads, equal_spacing, cw) in;  // in the picture, where y points down, counterclockwise from above
 layout(location = 0) patch in ivec2 whose;
 layout(location = 0) out vec4 local;
 

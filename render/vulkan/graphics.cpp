@@ -60,6 +60,8 @@ OwnedPipeline make_graphics(const Bindings& bindings, VkRenderPass pass, const G
   VkPipelineRasterizationStateCreateInfo raster{};
   raster.sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO, raster.lineWidth = 1;
   raster.polygonMode = state.lines ? VK_POLYGON_MODE_LINE : VK_POLYGON_MODE_FILL;
+  raster.cullMode = state.front_only ? VK_CULL_MODE_BACK_BIT : VK_CULL_MODE_NONE;
+  raster.frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE;
   // Edges lie a little nearer than the triangles that they belong to.
   raster.depthBiasEnable = state.lines, raster.depthBiasConstantFactor = 64;
   VkPipelineDepthStencilStateCreateInfo depth{};

@@ -8,7 +8,7 @@
 
 namespace patchwork::vk {
 
-/// What differs between the pipelines of this renderer: all draw without culling, and without vertex buffers.
+/// What differs between the pipelines of this renderer: all draw without vertex buffers.
 struct GraphicsState {
   struct Stage {
     VkShaderStageFlagBits stage;
@@ -19,7 +19,8 @@ struct GraphicsState {
   VkPrimitiveTopology topology = VK_PRIMITIVE_TOPOLOGY_PATCH_LIST;
   bool depth_write = true;
   VkCompareOp compare = VK_COMPARE_OP_GREATER;
-  bool lines = false;  ///< edges of triangles only
+  bool lines = false;       ///< edges of triangles only
+  bool front_only = false;  ///< no triangles that are clockwise in the picture
 };
 
 /// Viewport and scissor are set by commands.

@@ -24,14 +24,15 @@ constexpr VkShaderStageFlags kStages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_ST
                                        VK_SHADER_STAGE_FRAGMENT_BIT;
 
 OwnedPipeline terrain_pipeline(const Bindings& bindings, VkRenderPass pass, const Subdivision& subdivision,
-                               std::span<const std::uint32_t> constants, bool edges) {
+                               std::span<const std::uint32_t> constants, bool edges, bool front_only) {
   std::vector<GraphicsState::Stage> stages = subdivision.stages();
   stages.push_back({VK_SHADER_STAGE_FRAGMENT_BIT, shaders::terrain_frag()});
   return make_graphics(bindings, pass,
                        {.stages = std::move(stages),
                         .constants = constants,
                         .topology = subdivision.topology(),
-                        .lines = edges});
+                        .lines = edges,
+                        .front_only = front_only});
 }
 
 OwnedPipeline sky_pipeline(const Bindings& bindings, VkRenderPass pass,
@@ -89,21 +90,22 @@ TerrainPass::Pipelines& TerrainPass::pipelines(const FrameEffects& effects, cons
   return pipelines_[{effects.on().to_ulong(), set.to_ulong()}];
 }
 
-void TerrainPass::use(const FrameEffects& effects) {
+void TerrainPass::use(const FrameEffects& effects, bool front_only) {
   if (generation_ != effects.generation()) effects.bind(bindings_, set_, store_);
   generation_ = effects.generation();
-  used_.clear();
+  grounds_.clear(), edges_.clear();
   for (const DrawGroup& g : groups_) {
     const effects::Set set(g.effects);
     Pipelines& p = pipelines(effects, set);
     const auto make = [&](OwnedPipeline& pipeline, bool edges) {
       if (!pipeline)
-        pipeline =
-            terrain_pipeline(bindings_, pass_, *subdivision_, effects.constants(set, g.holes, edges), edges);
+        pipeline = terrain_pipeline(bindings_, pass_, *subdivision_, effects.constants(set, g.holes, edges),
+                                    edges, front_only && !edges);
     };
-    make(p.ground[g.holes], false);
-    if (has(effects.on(), effects::Id::wireframe)) make(p.edges[g.holes], true);
-    used_.push_back(&p);
+    OwnedPipeline& ground = p.ground[g.holes][front_only];
+    make(ground, false), grounds_.push_back(&ground);
+    if (!has(effects.on(), effects::Id::wireframe)) continue;
+    make(p.edges[g.holes], true), edges_.push_back(&p.edges[g.holes]);
   }
   sky_ = nullptr;
   if (!effects.draws_sky()) return;
@@ -115,11 +117,9 @@ void TerrainPass::use(const FrameEffects& effects) {
 void TerrainPass::record_draws(VkCommandBuffer commands) const {
   vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, bindings_.layout(), 0, 1, &set_, 0,
                           nullptr);
-  for (const auto kind : {&Pipelines::ground, &Pipelines::edges})
-    for (std::size_t g = 0; g < groups_.size(); ++g) {
-      const OwnedPipeline& pipeline = (used_[g]->*kind)[groups_[g].holes];
-      if (!pipeline) continue;
-      vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline.get());
+  for (const auto* pipelines : {&grounds_, &edges_})
+    for (std::size_t g = 0; g < pipelines->size(); ++g) {
+      vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, (*pipelines)[g]->get());
       subdivision_->draw(commands, g);
     }
   if (!sky_) return;

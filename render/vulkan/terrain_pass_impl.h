@@ -34,9 +34,9 @@ class TerrainPass {
   void set(const FrameBlock& frame, std::span<const TileDraw> draws);
   /// Outside of a render pass: how what was set is divided. Returns how many dispatches that takes.
   std::size_t record_subdivision(VkCommandBuffer commands) const;
-  /// How pixels are coloured from now on: pipelines are made when a set of effects is first met. REQUIRES: as
-  /// for set.
-  void use(const FrameEffects& effects);
+  /// How pixels are coloured from now on: pipelines are made when a set of effects is first met. front_only:
+  /// without triangles that look away, which the caller knows to be hidden. REQUIRES: as for set.
+  void use(const FrameEffects& effects, bool front_only);
   /// Inside of one, after use.
   void record_draws(VkCommandBuffer commands) const;
 
@@ -46,7 +46,8 @@ class TerrainPass {
  private:
   // Of one set of a picture's effects; what was not needed yet is none.
   struct Pipelines {
-    std::array<OwnedPipeline, 2> ground, edges;  // without and with holes
+    std::array<std::array<OwnedPipeline, 2>, 2> ground;  // without and with holes; all triangles, front ones
+    std::array<OwnedPipeline, 2> edges;                  // without and with holes
     OwnedPipeline sky;
   };
   Pipelines& pipelines(const FrameEffects& effects, const effects::Set& set);
@@ -54,7 +55,7 @@ class TerrainPass {
   VkRenderPass pass_;
   Bindings bindings_;
   std::map<std::pair<unsigned long, unsigned long>, Pipelines> pipelines_;  // by the picture's and the set
-  std::vector<const Pipelines*> used_;                                      // by each group
+  std::vector<const OwnedPipeline*> grounds_, edges_;                       // of each group; no edges: none
   const Pipelines* sky_ = nullptr;
   unsigned generation_ = 0;
   VkDescriptorSet set_ = VK_NULL_HANDLE;

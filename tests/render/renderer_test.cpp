@@ -118,6 +118,53 @@ TEST_F(TerrainTest, NoBackgroundInsideTheSilhouette) {
   }
 }
 
+// Over ground without gaps what looks away is hidden by what looks towards the eye, and left out. A hole out
+// of sight forbids that, and nothing else: both draw the same.
+TEST_F(TerrainTest, WhatLooksAwayIsLeftOutOnlyWhereItIsHidden) {
+  const auto ground = [](bool whole, double east) {
+    GridFile file{.width = 150, .height = 150, .geotransform = {east, 12, 0, 1800, 0, -12}, .accuracy = 0.01};
+    file.at = [=](int i, int j) {
+      if (!whole && i > 146 && j > 146) return double(NAN);
+      return 300 + 40 * std::sin(i / 9.0) * std::cos(j / 7.0) + 2 * std::sin(12.9898 * i * i + 78.233 * j);
+    };
+    return file;
+  };
+  const Land whole({ground(true, 0)}), holed({ground(false, 0)});
+  const Land beside({ground(true, 0), ground(true, 900)});  // one reaches beyond the other
+  RendererOptions options{
+      .width = kWidth, .height = kHeight, .pixel_error = 1, .memory = std::size_t{128} << 20};
+  std::mt19937_64 random(test_seed(26));
+  for (const auto& [name, way] : kWays) {
+    options.tessellation = way;
+    Renderer front(test_device(), whole.db(), options), all(test_device(), holed.db(), options),
+        two(test_device(), beside.db(), options);
+    std::size_t pixels = 0;
+    for (int n = 0; n < 20; ++n) {
+      std::uniform_real_distribution<double> at(100, 1200), up(360, 420), to(100, 1200);
+      const Camera camera{{at(random), at(random), up(random)}, {to(random), 1700, 250}, 60, kWidth, kHeight};
+      ASSERT_TRUE(front.draw(camera).front_only);
+      ASSERT_FALSE(all.draw(camera).front_only) << "it has a hole";
+      ASSERT_FALSE(two.draw(camera).front_only) << "its outline is not convex";
+      const std::vector<float> ours = front.depth(), theirs = all.depth();
+      std::size_t differ = 0;
+      for (std::size_t k = 0; k < ours.size(); ++k) {
+        ASSERT_EQ(std::isnan(ours[k]), std::isnan(theirs[k])) << name << " view " << n;
+        differ += !std::isnan(ours[k]) && ours[k] != theirs[k];
+      }
+      for (const float d : ours) pixels += !std::isnan(d);
+      EXPECT_LE(differ, 3u) << name << " view " << n
+                            << ": a crest may hit a pixel's centre with its far side alone";
+    }
+    EXPECT_GT(pixels, 100000u);
+    // From beside, and from below the summits, one may see what looks away.
+    EXPECT_FALSE(front.draw({{-500, 900, 500}, {900, 900, 300}, 60, kWidth, kHeight}).front_only);
+    EXPECT_FALSE(front.draw({{900, 900, 200}, {1200, 900, 300}, 60, kWidth, kHeight}).front_only);
+    std::size_t below = 0;
+    for (const float d : front.depth()) below += !std::isnan(d);
+    EXPECT_GT(below, 1000u) << "an eye under the ground sees it from below";
+  }
+}
+
 // An eye inside the boxes of tiles, a hand above the ground, looking down, and looking away from everything.
 TEST_F(TerrainTest, NearPlane) {
   Renderer r = renderer(1);

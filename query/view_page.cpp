@@ -43,6 +43,9 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 using Slots = hn::CappedTag<float, 16>;
 using Sides = hn::CappedTag<float, 8>;
+static_assert(LodPage::kSlots % hn::MaxLanes(Slots()) == 0 &&
+                  PageView::kMostSides % hn::MaxLanes(Sides()) == 0,
+              "vectors are read as a whole");
 
 std::uint64_t bits_of(Slots d, hn::Mask<Slots> mask) {
   using Bits = std::conditional_t<(hn::MaxLanes(Slots()) > 8), std::uint16_t, std::uint8_t>;
@@ -122,7 +125,7 @@ LodHits view_hits(const LodPage& page, const PageView& v, bool inside) {
   const double x = v.eye.x - page.origin.x, y = v.eye.y - page.origin.y;
   const double furthest = std::abs(x) + std::abs(y) + (page.reach + v.reach);
   if (!(furthest < v.most_reach)) return {page.used()};
-  const Eye eye{float(x), float(y), float(kLoss * (furthest + (page.reach + v.hair)))};
+  const Eye eye{float(x), float(y), float(kLoss * (furthest + (page.reach + v.unsure)))};
   LodHits hits{near_enough(page, v, eye)};
   hits.inside = hits.met;
   if (!inside && hits.met) keep_inside(page, v, eye, hits);
@@ -144,7 +147,8 @@ PageView::PageView(Point from, double height, double metres_a_metre, std::span<c
       slope(metres_a_metre),
       k_near(squared(slope < kLeast ? 0 : std::min(slope, kMost) * (1 - kHair))),
       k_far(squared(std::clamp(slope, kLeast, kMost) * (1 + kHair))),
-      height2(squared(std::min(above, kMost))) {
+      height2(squared(above < kLeast ? 0 : std::min(above, kMost))) {
+  if (corners.size() < 3) corners = {};
   if (corners.size() > kMostSides) throw std::length_error("a view's region has too many sides");
   most.fill(std::numeric_limits<double>::infinity()), from_eye.fill(std::numeric_limits<float>::infinity());
   Extent bounds = Extent::nothing();
@@ -156,10 +160,10 @@ PageView::PageView(Point from, double height, double metres_a_metre, std::span<c
   }
   west = float(bounds.xmin - eye.x), south = float(bounds.ymin - eye.y);
   east = float(bounds.xmax - eye.x), north = float(bounds.ymax - eye.y);
-  reach = far + above + 1, most_reach = std::min(kMost, kMost / slope);
-  hair = 0x1p-25 * (std::abs(eye.x) + std::abs(eye.y));
-  // Chosen once and not for every page.
-  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  reach = far + above + 1, most_reach = slope > 1 ? kMost / slope : kMost;
+  unsure = 0x1p-25 * (std::abs(eye.x) + std::abs(eye.y));  // with kLoss: 128 of their roundings
+  // Chosen once and not for every page; to ask the processor takes longer than a query.
+  if (!hwy::GetChosenTarget().IsInitialized()) hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   if (sides > 0) hits_ = &HWY_DYNAMIC_DISPATCH(view_hits);
 }
 

@@ -16,8 +16,8 @@ struct PageView {
   /// all nearly on one line, each may be a corner of either side of their hull.
   static constexpr std::size_t kMostSides = 40;
 
-  /// `corners` of the region, counterclockwise, each different from the next; none: nothing is seen. Throws
-  /// std::length_error beyond kMostSides.
+  /// `corners` of the region, counterclockwise, each different from the next; fewer than three: nothing is
+  /// seen. Throws std::length_error beyond kMostSides.
   PageView(Point eye, double above, double slope, std::span<const Point> corners);
   bool beyond(std::size_t side, Point p) const { return nx[side] * p.x + ny[side] * p.y > most[side]; }
 
@@ -31,7 +31,7 @@ struct PageView {
   float west, south, east, north;  ///< bounds of the region, metres from the eye
   /// Metres: from the eye to the furthest corner (along x and y together) or to the plane; how far floats can
   /// tell; what coordinates may have lost, as if it were a length that floats lose of.
-  double reach, most_reach, hair;
+  double reach, most_reach, unsure;
   /// Inside are the points with nx x + ny y <= most; |(nx, ny)| = 1. Those behind `sides` hold every point.
   /// What is positive of a normal stands apart from what is negative, so that a box's innermost and outermost
   /// corner need no choice.

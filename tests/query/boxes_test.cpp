@@ -191,6 +191,30 @@ TEST(ViewCutsOfPages, TakeViewsOfAnySize) {
   EXPECT_GT(met, 10000u);
   EXPECT_GT(regions, 5000u);
   EXPECT_LE(most, PageView::kMostSides);
+  // What is seen is so small that it has no area.
+  const auto speck = make_surface(
+      ViewCut{.eye = {0, 0, 1e-170}, .look = {1, 0, -1}, .far = 3e-170, .lowest = 0, .highest = 0});
+  EXPECT_EQ(speck->hits(page, false).met, 0u);
+  // No error is allowed, whatever its sign, and boxes beyond the region are told apart.
+  ViewCut exact{.eye = {0, 0, 100}, .look = {100, 0, 0}, .far = 1000, .lowest = 0, .highest = 0};
+  LodPage near(0);
+  near.append({{100, -1, 101, 1, 0, INFINITY}, {0}}), near.append({{-9000, 0, -8999, 1, 0, INFINITY}, {1}});
+  for (const double pixels : {0.0, -0.0}) {
+    exact.pixel_error = pixels;
+    EXPECT_EQ(make_surface(exact)->hits(near, false).met, 1u) << pixels;
+  }
+  // An eye that nearly touches the plane, and tolerances that grow fast.
+  const auto touching = make_surface(ViewCut{.eye = {0, 0, 3.24e-23},
+                                             .look = {1, 0, 0},
+                                             .pixel_error = 6.24e8,
+                                             .far = 10,
+                                             .lowest = 0,
+                                             .highest = 0,
+                                             .in_space = true});
+  LodPage under(0);
+  under.append({{-1, -1, 1, 1, 0, 3.4e-17f}, {0}});
+  EXPECT_TRUE(is_meant(*touching, under.box(0)));
+  EXPECT_EQ(touching->hits(under, false).met, 1u);
   EXPECT_NE(refusal_of([] {
               make_surface(ViewCut{.eye = {1, 0, 1.7e308},
                                    .look = {1.2178443318775637e307, 0, 8.500000000000001e306},

@@ -143,6 +143,11 @@ void expect_end_of(const std::istream& in) {
     throw Error("standard input", "it cannot be read to its end");
 }
 
+std::string source_name(const Database& db, std::int32_t source) {
+  if (source == 0) return "-";
+  return db.grids()[std::size_t(std::abs(source)) - 1].info.name + (source < 0 ? "(filled)" : "");
+}
+
 void print(const Json& document) { fmt::print("{}\n", document.dump(2)); }
 
 void note(const Common& common, const std::string& text) {

@@ -117,6 +117,9 @@ void note(const Common& common, const std::string& text);
 Json to_json(const Extent& e);
 /// xmin ymin xmax ymax to a millimetre.
 std::string to_text(const Extent& e);
+/// Whose height it is, by BlendOutput::source: the grid's name, with "(filled)" behind it where only a filled
+/// cell replies; "-" for none.
+std::string source_name(const Database& db, std::int32_t source);
 /// Counts of an extraction by level and by grid name.
 Json by_level(const Extraction& x);
 Json by_grid(const Database& db, const Extraction& x);

@@ -37,20 +37,16 @@ void run(const Options& o, const Common& common) {
       extract(db, {.error = o.surface.error, .region = Region::inside(around), .strict = o.surface.strict});
   const auto surface = make_evaluator(db, x.patches, o.surface, common.memory);
   const Profile p = profile_along(*surface, line, o.step > 0 ? o.step : finest_step(db, around));
-  const auto name = [&](std::int32_t source) {
-    return source == 0
-               ? std::string("-")
-               : db.grids()[std::size_t(std::abs(source)) - 1].info.name + (source < 0 ? "(filled)" : "");
-  };
   if (common.json) {
     Json j = summary(p);
     j["points"] = Json::array();
     for (const ProfilePoint& q : p.points)
-      j["points"].push_back({q.distance, q.at.x, q.at.y, q.height, q.bound, name(q.source)});
+      j["points"].push_back({q.distance, q.at.x, q.at.y, q.height, q.bound, source_name(db, q.source)});
     return print(j);
   }
   for (const ProfilePoint& q : p.points)
-    fmt::print("{} {} {} {} {} {}\n", q.distance, q.at.x, q.at.y, q.height, q.bound, name(q.source));
+    fmt::print("{} {} {} {} {} {}\n", q.distance, q.at.x, q.at.y, q.height, q.bound,
+               source_name(db, q.source));
   note(common,
        fmt::format(
            "{:.6g} m, heights {:.2f} to {:.2f} m, up {:.2f} m, down {:.2f} m, bound at most {:.4g} m{}",

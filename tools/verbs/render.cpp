@@ -81,6 +81,7 @@ Json facts(const FrameStats& s) {
           {"tiles_made", s.tiles_made},
           {"blocks", {{"copied", s.blocks.inside}, {"blended", s.blocks.partial}, {"beside", s.blocks.out}}},
           {"triangles", s.triangles},
+          {"front_only", s.front_only},
           {"dispatches", s.dispatches},
           {"draws", s.draws},
           {"bytes_up", s.bytes_up},

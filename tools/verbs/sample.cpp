@@ -62,13 +62,12 @@ class Sampler {
     x_.clear(), y_.clear();
   }
   void write(std::size_t k, fmt::memory_buffer& out) const {
-    if (source_[k] == 0) {
+    if (source_[k] == 0) {  // whatever sign these have
       fmt::format_to(std::back_inserter(out), "{} {} nan nan -\n", x_[k], y_[k]);
       return;
     }
-    const std::string& name = db_.grids()[size_t(std::abs(source_[k])) - 1].info.name;
-    fmt::format_to(std::back_inserter(out), "{} {} {} {} {}{}\n", x_[k], y_[k], height_[k], bound_[k], name,
-                   source_[k] < 0 ? "(filled)" : "");
+    fmt::format_to(std::back_inserter(out), "{} {} {} {} {}\n", x_[k], y_[k], height_[k], bound_[k],
+                   source_name(db_, source_[k]));
   }
 
   const Database& db_;

@@ -64,17 +64,26 @@ struct Ground {
   }
 };
 
-// That of a grid without holes which holds all others, if there is one.
+// That of a grid without holes which holds all others, to a hair of its cells, if there is one.
 std::optional<Ground> ground_of(const Database& db) {
+  constexpr double kHair = 1e-6;
+  const auto holds = [](double low, double high, double a, double b, double hair) {
+    return low - hair <= a && b <= high + hair;
+  };
+  const Extent all = db.grids().empty() ? Extent{} : db.extent();
   for (const Grid& g : db.grids()) {
-    if (g.info.holes) continue;
     const Frame& f = g.info.frame;
+    const Extent e = g.info.bounds();
+    const double hair = kHair * f.finer_step();
+    if (g.info.holes || !holds(e.xmin, e.xmax, all.xmin, all.xmax, hair) ||
+        !holds(e.ymin, e.ymax, all.ymin, all.ymax, hair))
+      continue;
     const LatticeRect own = g.info.shape.footprint();
-    const bool all = std::all_of(db.grids().begin(), db.grids().end(), [&](const Grid& o) {
+    const bool holds_all = std::all_of(db.grids().begin(), db.grids().end(), [&](const Grid& o) {
       const LatticeRect r = f.lattice_bounds(o.info.frame.corners(o.info.shape.footprint()));
-      return &o == &g || (own.i0 <= r.i0 && r.i1 <= own.i1 && own.j0 <= r.j0 && r.j1 <= own.j1);
+      return holds(own.i0, own.i1, r.i0, r.i1, kHair) && holds(own.j0, own.j1, r.j0, r.j1, kHair);
     });
-    if (all) return Ground{f, g.info.shape.samples()};
+    if (holds_all) return Ground{f, g.info.shape.samples()};
   }
   return {};
 }
@@ -159,15 +168,19 @@ struct Renderer::Impl {
     return b;
   }
 
-  // From an eye above terrain without gaps, what a line of sight meets first looks towards the eye.
-  bool hides_what_looks_away(const Selection& selection) const {
+  // From an eye above terrain without gaps, what a line of sight meets first looks towards the eye. Coarse
+  // tiles may have teeth along the outline, and stale ones gaps towards others.
+  bool hides_what_looks_away(const Selection& selection, const FrameStats& stats) const {
+    if (stats.tiles_coarse > 0 || selection.stale || std::isfinite(options.far)) return false;
     if (!ground || !ground->holds({camera.eye.x, camera.eye.y})) return false;
     const double tile = 2 * TileLattice::kCells * lattice.half_cell();
     const TileKey key{0, std::int32_t(std::floor((camera.eye.x - lattice.origin().x) / tile)),
                       std::int32_t(std::floor((camera.eye.y - lattice.origin().y) / tile))};
     const Selection::Leaf* leaf = lattice.contains(key) ? selection.leaf_at(key, 0, 0) : nullptr;
     const TileCache::Node* node = leaf ? supply.cache().find(leaf->key) : nullptr;
-    return node && !node->empty && camera.eye.z > node->facts.highest + node->facts.error + kNear;
+    const double high = camera.tan_half(),
+                 corner = kNear * std::hypot(1, high, high * camera.width / camera.height);
+    return node && !node->empty && camera.eye.z > node->facts.highest + node->facts.error + corner;
   }
 
   void submit(FrameStats& stats) {
@@ -247,7 +260,7 @@ FrameStats Renderer::Impl::draw(const Camera& from) {
   make_draws(lattice, selection, supply.cache(), {camera.eye.x, camera.eye.y}, draws,
              [&](const TileKey& key, const TileFacts& facts) { return matter_to(key, facts); });
   stats.tiles_drawn = draws.size();
-  stats.front_only = stats.tiles_stale == 0 && hides_what_looks_away(selection);
+  stats.front_only = hides_what_looks_away(selection, stats);
   // With the same input the picture is the one that is there.
   if (!drawn || other_look || stats.tiles_made > 0 || now != block || draws != last_draws) {
     terrain.set(now, draws);

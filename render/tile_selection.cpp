@@ -13,7 +13,8 @@ class Selector {
   Selector(const TileLattice& lattice, const Frustum& frustum, const SelectionOptions& options,
            TileCache& cache, Selection& out)
       : lattice_(lattice), frustum_(frustum), options_(options), cache_(cache), out_(out) {
-    out_.tiles.clear(), out_.leaves.clear(), out_.drawn.clear(), out_.wanted.clear(), out_.pixels = 0;
+    out_.tiles.clear(), out_.leaves.clear(), out_.drawn.clear(), out_.wanted.clear(), out_.stale = false,
+                                                                                      out_.pixels = 0;
   }
 
   void run() {
@@ -54,6 +55,7 @@ class Selector {
     out_.leaves.push_back(leaf);
     out_.tiles[key] = place;
     if (!node.empty) cache_.use(key, leaf.pixels);
+    out_.stale |= node.stale;
     if (node.stale && (leaf.drawn || node.empty)) stale_.push_back(place);
     if (!leaf.drawn) return;
     ++drawn_;

@@ -29,6 +29,7 @@ struct Selection {
   std::vector<Leaf> leaves;                          ///< those that were split have drawn == false
   std::vector<std::uint32_t> drawn;                  ///< places in `leaves`, the largest error first
   std::vector<Wanted> wanted;                        ///< the most wanted first
+  bool stale = false;  ///< a leaf, in sight or not, is made from a state that has changed there
   ///< Error reached: the largest of all that is drawn and could be finer.
   double pixels = 0;
   static constexpr std::uint32_t kSplit = UINT32_MAX;

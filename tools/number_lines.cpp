@@ -71,10 +71,34 @@ class Fields {
   char separator_ = 0;  // 0: blanks
 };
 
+// Nothing but what parts fields.
+bool is_blank_line(std::string_view line) {
+  return std::all_of(line.begin(), line.end(), [](char c) { return is_blank(c) || rank_of(c) > 0; });
+}
+
 bool parse(std::string_view token, double& value) {
   if (!token.empty() && token.front() == '+') token.remove_prefix(1);
   const auto [end, bad] = std::from_chars(token.data(), token.data() + token.size(), value);
   return bad == std::errc() && end == token.data() + token.size();
+}
+
+// As many numbers as there are values and nothing else, whatever parts them: "x,y,h x,y,h".
+bool parse_all(std::string_view line, std::span<double> values) {
+  std::size_t found = 0;
+  for (std::size_t at = 0; at < line.size();) {
+    std::size_t to = at;
+    while (to < line.size() && !is_blank(line[to]) && rank_of(line[to]) == 0) ++to;
+    if (to > at && (found == values.size() || !parse(line.substr(at, to - at), values[found++])))
+      return false;
+    at = to + 1;
+  }
+  return found == values.size();
+}
+
+// Adds to what is listed between commas.
+void list(std::string& all, std::string_view one) {
+  if (!all.empty()) all.append(", ");
+  all.append(one);
 }
 
 std::string lower_case(std::string_view text) {
@@ -94,7 +118,7 @@ bool NumberLines::next(std::span<double> values) {
   while (std::getline(in_, line_)) {
     if (++number_ == 1 && line_.starts_with("\xEF\xBB\xBF")) line_.erase(0, 3);  // a mark of UTF-8
     Fields fields(line_);
-    if (!fields.more() || line_[0] == '#') continue;
+    if (is_blank_line(line_) || line_[0] == '#') continue;
     std::size_t found = 0;
     for (std::size_t column = 0; fields.more() && found < places_.size(); ++column) {
       const std::string_view field = fields.next();
@@ -105,12 +129,13 @@ bool NumberLines::next(std::span<double> values) {
     }
     const bool first = !begun_;
     begun_ = true;
-    if (found == places_.size()) return true;
+    if (found == places_.size() || (!named_ && parse_all(line_, values))) return true;
     if (first && is_header(line_)) continue;
-    std::string columns;
-    for (const std::size_t place : places_)
-      columns += (columns.empty() ? "" : ", ") + std::to_string(place + 1);
-    throw Error("line " + std::to_string(number_), "one of its columns " + columns + " holds no number");
+    std::string columns, names;
+    for (std::size_t k = 0; k < places_.size(); ++k)
+      list(columns, std::to_string(places_[k] + 1)), list(names, names_[k].front());
+    throw Error("line " + std::to_string(number_),
+                "its columns " + columns + " are not the numbers " + names);
   }
   expect_end_of(in_);
   return false;
@@ -122,8 +147,8 @@ bool NumberLines::is_header(std::string_view line) {
   std::size_t column = 0;
   for (Fields fields(line); fields.more(); ++column) {
     const std::string name = lower_case(fields.next());
-    double number;
-    if (parse(name, number)) return false;
+    if (!name.empty() && std::string_view("0123456789+-.").find(name[0]) != std::string_view::npos)
+      return false;  // a number, or something that should be one
     for (std::size_t k = 0; k < names_.size(); ++k)
       if (at[k] == kNowhere && std::find(names_[k].begin(), names_[k].end(), name) != names_[k].end()) {
         at[k] = column;
@@ -133,12 +158,11 @@ bool NumberLines::is_header(std::string_view line) {
   if (column < names_.size()) return false;
   const auto missing = std::find(at.begin(), at.end(), kNowhere);
   if (missing == at.end()) {
-    places_ = at;
+    places_ = at, named_ = true;
   } else if (column > names_.size() ||
              std::any_of(at.begin(), at.end(), [](auto c) { return c != kNowhere; })) {
     std::string names;
-    for (const std::string_view name : names_[std::size_t(missing - at.begin())])
-      names += (names.empty() ? "" : ", ") + std::string(name);
+    for (const std::string_view name : names_[std::size_t(missing - at.begin())]) list(names, name);
     throw Error("header", "it names no column " + names.substr(0, names.find(',')),
                 "it may be called: " + names);
   }

@@ -12,7 +12,8 @@ namespace patchwork::cli {
 
 /// The numbers of some columns, line after line. Fields lie between tabs, else between semicolons, else
 /// between commas, where empty ones count; else between blanks; quoted ones may hold what else parts them.
-/// Empty lines and those that begin with # are left out, and so is a mark of UTF-8.
+/// Without a header, just as many numbers as columns may be parted by anything of these. Empty lines and
+/// those that begin with # are left out, and so is a mark of UTF-8.
 class NumberLines {
  public:
   /// Names by which a header may call a column, lower case.
@@ -33,7 +34,7 @@ class NumberLines {
   std::vector<std::size_t> places_;  // of the columns
   std::string line_;
   std::size_t number_ = 0;
-  bool begun_ = false;
+  bool begun_ = false, named_ = false;  // the columns, by a header
 };
 
 }  // namespace patchwork::cli

@@ -44,6 +44,7 @@ struct CostRow {
   double samples = 0;
   std::optional<Cost> found = {}, expected = {};  ///< where the model can say something: what it goes by
   std::optional<double> predicted = {};           ///< milliseconds of all stages
+  bool again = false;                             ///< the same work as a row before it, measured with that
   bool fitted = false;                            ///< the model was made from it
   std::size_t beyond = 0;  ///< points farther from the best than both bounds allow, or without an answer
 };

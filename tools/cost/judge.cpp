@@ -107,7 +107,7 @@ void fit_model(CostReport& report) {
     const double patches = double(row.expected->patches);
     row.predicted = 1e3 * (m.seconds(double(row.expected->nodes), patches) + m.read_seconds(patches) +
                            m.blend_seconds(patches, row.samples));
-    if (row.fitted) continue;
+    if (row.fitted || row.again) continue;
     measured.push_back(median(row.ms.total())), predicted.push_back(*row.predicted);
   }
   double mean = 0, around = 0, left = 0;

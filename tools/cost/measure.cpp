@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -105,7 +106,9 @@ class Bench {
         measure(runs, {.least = o_.runs, .until = until, .progress = [&](double share) {
                          bar_.show(kGathering + (1 - kGathering) * share);
                        }});
+    std::set<const MeasuredRun*> seen;
     for (Measurable& m : all_) {
+      m.row.again = !seen.insert(m.once.get()).second;
       report_.rows.push_back(std::move(m.row));
       report_.rows.back().ms = times[place[m.once.get()]];
     }

@@ -33,8 +33,12 @@ struct Asked {
 };
 
 std::vector<Asked> read_lines(std::istream& in) {
-  const NumberLines::Names x{"x", "easting"}, y{"y", "northing"}, h{"h", "z", "height"};
-  NumberLines lines(in, {x, y, h, x, y, h});
+  NumberLines lines(in, {{"x1", "x", "easting"},
+                         {"y1", "y", "northing"},
+                         {"h1", "h", "height"},
+                         {"x2", "x", "easting"},
+                         {"y2", "y", "northing"},
+                         {"h2", "h", "height"}});
   std::vector<Asked> all;
   for (double n[6]; lines.next(n);) all.push_back({{n[0], n[1], n[2]}, {n[3], n[4], n[5]}});
   return all;
@@ -145,7 +149,8 @@ void add_sight(CLI::App& app, Common& common) {
   CLI::App* v =
       verb(app, common, "sight",
            "lines of sight: what hides them, and where a ray first meets the terrain; without --from, lines "
-           "\"x y h x y h\" in, \"visible|hidden verdict clearance its-distance hit-distance\" out");
+           "\"x y h x y h\" (or a table with columns x1 y1 h1 x2 y2 h2) in, \"visible|hidden verdict "
+           "clearance its-distance hit-distance\" out");
   v->add_option("DB", o->database, "the database")->required();
   auto* from = v->add_option("--from", o->from, "the eye: x y h, h in metres above the ground")->expected(3);
   auto* to = v->add_option("--to", o->to, "what it looks at: x y h")->expected(3)->needs(from);

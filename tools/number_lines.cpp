@@ -71,28 +71,31 @@ class Fields {
   char separator_ = 0;  // 0: blanks
 };
 
-// Nothing but what parts fields.
-bool is_blank_line(std::string_view line) {
-  return std::all_of(line.begin(), line.end(), [](char c) { return is_blank(c) || rank_of(c) > 0; });
-}
-
 bool parse(std::string_view token, double& value) {
   if (!token.empty() && token.front() == '+') token.remove_prefix(1);
   const auto [end, bad] = std::from_chars(token.data(), token.data() + token.size(), value);
   return bad == std::errc() && end == token.data() + token.size();
 }
 
-// As many numbers as there are values and nothing else, whatever parts them: "x,y,h x,y,h".
+// As many numbers as there are values and nothing else, between blanks or one of what parts fields each:
+// "x,y,h x,y,h".
 bool parse_all(std::string_view line, std::span<double> values) {
   std::size_t found = 0;
+  bool parted = false;  // since the last number
   for (std::size_t at = 0; at < line.size();) {
-    std::size_t to = at;
-    while (to < line.size() && !is_blank(line[to]) && rank_of(line[to]) == 0) ++to;
-    if (to > at && (found == values.size() || !parse(line.substr(at, to - at), values[found++])))
-      return false;
-    at = to + 1;
+    if (rank_of(line[at]) > 0) {
+      if (parted || found == 0) return false;  // an empty field
+      parted = true;
+    }
+    if (rank_of(line[at]) > 0 || is_blank(line[at])) {
+      ++at;
+      continue;
+    }
+    const std::size_t to = std::min(line.find_first_of(" \r\t;,", at), line.size());
+    if (found == values.size() || !parse(line.substr(at, to - at), values[found++])) return false;
+    at = to, parted = false;
   }
-  return found == values.size();
+  return found == values.size() && !parted;
 }
 
 // Adds to what is listed between commas.
@@ -118,7 +121,7 @@ bool NumberLines::next(std::span<double> values) {
   while (std::getline(in_, line_)) {
     if (++number_ == 1 && line_.starts_with("\xEF\xBB\xBF")) line_.erase(0, 3);  // a mark of UTF-8
     Fields fields(line_);
-    if (is_blank_line(line_) || line_[0] == '#') continue;
+    if (!fields.more() || line_[0] == '#') continue;
     std::size_t found = 0;
     for (std::size_t column = 0; fields.more() && found < places_.size(); ++column) {
       const std::string_view field = fields.next();
@@ -141,14 +144,17 @@ bool NumberLines::next(std::span<double> values) {
   return false;
 }
 
-// A line without a number: of names of all columns, or, of none, just as many fields.
+// A line without a number: of names of all columns, or, of none, just as many words.
 bool NumberLines::is_header(std::string_view line) {
   std::vector<std::size_t> at(names_.size(), kNowhere);
   std::size_t column = 0;
+  bool words = true;  // none should have been a number
   for (Fields fields(line); fields.more(); ++column) {
     const std::string name = lower_case(fields.next());
-    if (!name.empty() && std::string_view("0123456789+-.").find(name[0]) != std::string_view::npos)
-      return false;  // a number, or something that should be one
+    double number;
+    if (parse(name, number)) return false;
+    words =
+        words && (name.empty() || std::string_view("0123456789+-.").find(name[0]) == std::string_view::npos);
     for (std::size_t k = 0; k < names_.size(); ++k)
       if (at[k] == kNowhere && std::find(names_[k].begin(), names_[k].end(), name) != names_[k].end()) {
         at[k] = column;
@@ -166,7 +172,7 @@ bool NumberLines::is_header(std::string_view line) {
     throw Error("header", "it names no column " + names.substr(0, names.find(',')),
                 "it may be called: " + names);
   }
-  return true;
+  return named_ || words;
 }
 
 }  // namespace patchwork::cli

@@ -12,8 +12,8 @@ namespace patchwork::cli {
 
 /// The numbers of some columns, line after line. Fields lie between tabs, else between semicolons, else
 /// between commas, where empty ones count; else between blanks; quoted ones may hold what else parts them.
-/// Without a header, just as many numbers as columns may be parted by anything of these. Empty lines and
-/// those that begin with # are left out, and so is a mark of UTF-8.
+/// Without a header, just as many numbers as columns may be parted by any of these, each by its own. Empty
+/// lines and those that begin with # are left out, and so is a mark of UTF-8.
 class NumberLines {
  public:
   /// Names by which a header may call a column, lower case.

@@ -83,6 +83,11 @@ TEST_F(Sample, NamesTheLineThatItCannotRead) {
                                                         {"x,y\n1,2\n\n# c\n3;\n", "line 5"},
                                                         {"1 2\nx y\n", "line 2"},
                                                         {"1 2\n1.5.5 2\n", "line 2"},
+                                                        {"500105,,4999895\n", "line 1"},
+                                                        {",500105,4999895\n", "line 1"},
+                                                        {"500105 4999895,\n", "line 1"},
+                                                        {"1 2\n,,\n", "line 2"},
+                                                        {"500105,5;4999895,5\n", "line 1"},
                                                         {"id,x,y\n1,,4999895\n", "line 2"},
                                                         {"id,x,z\n1,500105,3\n", "no column y"},
                                                         {"id,x_utm,y_utm\n1,2,3\n", "no column x"}}) {

@@ -78,13 +78,12 @@ TEST_F(SightVerb, TakesTablesWithNamedColumns) {
   };
   const std::string want = answer("500105 4999705 1.8 500805 4999705 2\n");
   EXPECT_NE(want, answer("500105 4999705 1.8 500205 4999705 2\n"));
-  for (const char* form :
-       {"x,y,h,x,y,h\n500105,4999705,1.8,500805,4999705,2\n",
-        "\xEF\xBB\xBFmast;easting;northing;height;easting;northing;height\n"
-        "\"Hill; east\";500105;4999705;1.8;500805;4999705;2\n",
-        "500105,4999705,1.8 500805,4999705,2\n,,,,,\n", "500105 4999705 1.8; 500805 4999705 2\n",
-        "x1,y1,h1,x2,y2,h2\n500105,4999705,1.8,500805,4999705,2\n",
-        "y\tx\ty\tx\th\th\tnote\n4999705\t500105\t4999705\t500805\t1.8\t2\tseen?\n"})
+  for (const char* form : {"x,y,h,x,y,h\n500105,4999705,1.8,500805,4999705,2\n",
+                           "\xEF\xBB\xBFmast;easting;northing;height;easting;northing;height\n"
+                           "\"Hill; east\";500105;4999705;1.8;500805;4999705;2\n",
+                           "500105,4999705,1.8 500805,4999705,2\n", "500105 4999705 1.8; 500805 4999705 2\n",
+                           "x1,y1,h1,x2,y2,h2\n500105,4999705,1.8,500805,4999705,2\n",
+                           "y\tx\ty\tx\th\th\tnote\n4999705\t500105\t4999705\t500805\t1.8\t2\tseen?\n"})
     EXPECT_EQ(answer(form), want) << form;
   EXPECT_SAYS(complaint(run({"sight", database_}, {.input = "x,y,h,x,y\n1,2,3,4,5\n"})), "line 1");
   EXPECT_SAYS(complaint(run({"sight", database_}, {.input = "x,y,h,x,y,name\n1,2,3,4,5,6\n"})),

@@ -159,6 +159,14 @@ TEST_F(TerrainTest, WhatLooksAwayIsLeftOutOnlyWhereItIsHidden) {
     // From beside, and from below the summits, one may see what looks away.
     EXPECT_FALSE(front.draw({{-500, 900, 500}, {900, 900, 300}, 60, kWidth, kHeight}).front_only);
     EXPECT_FALSE(front.draw({{900, 900, 200}, {1200, 900, 300}, 60, kWidth, kHeight}).front_only);
+    RendererOptions near = options;
+    near.far = 5000;
+    EXPECT_FALSE(Renderer(test_device(), whole.db(), near)
+                     .draw({{900, 900, 500}, {900, 1700, 250}, 60, kWidth, kHeight})
+                     .front_only)
+        << "tiles that hide may be left out";
+    EXPECT_TRUE(front.draw({{900, 900, 500}, {900, 1700, 250}, 60, kWidth, kHeight}).front_only);
+    front.draw({{900, 900, 200}, {1200, 900, 300}, 60, kWidth, kHeight});
     std::size_t below = 0;
     for (const float d : front.depth()) below += !std::isnan(d);
     EXPECT_GT(below, 1000u) << "an eye under the ground sees it from below";

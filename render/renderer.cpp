@@ -169,7 +169,7 @@ struct Renderer::Impl {
   }
 
   // From an eye above terrain without gaps, what a line of sight meets first looks towards the eye. Coarse
-  // tiles may have teeth along the outline, and stale ones gaps towards others.
+  // tiles may have teeth along the outline, and those in sight that are stale gaps towards others.
   bool hides_what_looks_away(const Selection& selection, const FrameStats& stats) const {
     if (stats.tiles_coarse > 0 || selection.stale || std::isfinite(options.far)) return false;
     if (!ground || !ground->holds({camera.eye.x, camera.eye.y})) return false;
@@ -180,7 +180,8 @@ struct Renderer::Impl {
     const TileCache::Node* node = leaf ? supply.cache().find(leaf->key) : nullptr;
     const double high = camera.tan_half(),
                  corner = kNear * std::hypot(1, high, high * camera.width / camera.height);
-    return node && !node->empty && camera.eye.z > node->facts.highest + node->facts.error + corner;
+    return node && !node->empty && !node->stale &&
+           camera.eye.z > node->facts.highest + node->facts.error + corner;
   }
 
   void submit(FrameStats& stats) {

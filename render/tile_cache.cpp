@@ -20,7 +20,7 @@ const TileCache::Node* TileCache::find(const TileKey& key) const {
 
 void TileCache::use(const TileKey& key, double pixels) {
   Node& n = nodes_.at(key);
-  n.used = frame_, n.pixels = pixels;
+  n.used = selection_, n.pixels = pixels;
 }
 
 bool TileCache::better_victim(const Node& a, const Node& b) const {
@@ -28,10 +28,9 @@ bool TileCache::better_victim(const Node& a, const Node& b) const {
   return a.pixels != b.pixels ? a.pixels < b.pixels : a.used < b.used;
 }
 
-bool TileCache::has_room() const {
-  return !free_.empty() || std::any_of(tiles_.begin(), tiles_.end(), [&](const Slot& s) {
-    return s.known && nodes_.at(s.tile).used != frame_;
-  });
+std::size_t TileCache::room() const {
+  const auto idle = [&](const Slot& s) { return s.known && nodes_.at(s.tile).used != selection_; };
+  return free_.size() + std::size_t(std::count_if(tiles_.begin(), tiles_.end(), idle));
 }
 
 std::uint32_t TileCache::take_slot() {
@@ -40,7 +39,7 @@ std::uint32_t TileCache::take_slot() {
     for (std::uint32_t s = 0; s < slots(); ++s) {
       if (!tiles_[s].known) continue;
       const Node& n = nodes_.at(tiles_[s].tile);
-      if (n.used == frame_) continue;
+      if (n.used == selection_) continue;
       if (victim == kNoSlot || better_victim(n, nodes_.at(tiles_[victim].tile))) victim = s;
       if (policy_ == TilePolicy::first) break;
     }
@@ -59,7 +58,7 @@ void TileCache::give_up(std::uint32_t slot) { tiles_[slot] = {}, free_.push_back
 void TileCache::put(const TileKey& key, const TileFacts& facts, std::uint32_t slot) {
   Node& n = nodes_[key];
   if (n.slot != kNoSlot) give_up(n.slot);
-  n.facts = facts, n.slot = slot, n.used = frame_;
+  n.facts = facts, n.slot = slot, n.used = selection_;
   n.empty = slot == kNoSlot, n.stale = false;
   if (slot == kNoSlot) return;
   assert(tiles_[slot].taken && !tiles_[slot].known);

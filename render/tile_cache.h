@@ -24,20 +24,20 @@ struct TileFacts {
 
 /// How a slot is found for a new tile when none is free.
 enum class TilePolicy {
-  first,      ///< the first that this frame does not use
+  first,      ///< the first that is not used now
   lru,        ///< the one that was used longest ago
   lru_error,  ///< the same, among those of the smallest error on the screen when last used
 };
 
 /// Nodes of the quadtree that have been made, and the fixed pool of slots. A tile knows its slot and a slot
-/// its tile. No slot that this frame uses is given away.
+/// its tile. No slot that is used since the last begin_selection() is given away.
 class TileCache {
  public:
   static constexpr std::uint32_t kNoSlot = UINT32_MAX;
   struct Node {
     TileFacts facts;
     std::uint32_t slot = kNoSlot;  ///< none: without data
-    std::uint64_t used = 0;        ///< frame
+    std::uint64_t used = 0;        ///< the selection that did last
     double pixels = 0;             ///< its error on the screen when last used
     bool empty = false;            ///< nothing answers in it
     bool stale = false;            ///< made from a state of the database that has changed here
@@ -46,12 +46,12 @@ class TileCache {
 
   TileCache(std::uint32_t slots, TilePolicy policy);
 
-  void begin_frame() { ++frame_; }
+  void begin_selection() { ++selection_; }
   const Node* find(const TileKey& key) const;
-  /// Keeps its slot during this frame. REQUIRES: the node is there.
+  /// Keeps its slot until the next begin_selection(). REQUIRES: the node is there.
   void use(const TileKey& key, double pixels);
-  bool has_room() const;  ///< take_slot() would give one
-  /// A slot for a tile that is about to be made; kNoSlot where this frame uses all of them.
+  std::size_t room() const;  ///< how many slots take_slot() would give
+  /// A slot for a tile that is about to be made; kNoSlot where all of them are used.
   std::uint32_t take_slot();
   /// The tile is made. REQUIRES: `slot` was taken, or is kNoSlot for a tile without data.
   void put(const TileKey& key, const TileFacts& facts, std::uint32_t slot);
@@ -76,7 +76,7 @@ class TileCache {
   std::vector<std::uint32_t> free_;
   std::unordered_map<TileKey, Node> nodes_;
   TilePolicy policy_;
-  std::uint64_t frame_ = 1, evictions_ = 0;
+  std::uint64_t selection_ = 1, evictions_ = 0;
 };
 
 }  // namespace patchwork

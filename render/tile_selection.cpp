@@ -55,13 +55,18 @@ class Selector {
     out_.leaves.push_back(leaf);
     out_.tiles[key] = place;
     if (!node.empty) cache_.use(key, leaf.pixels);
-    out_.stale |= node.stale;
-    if (node.stale && (leaf.drawn || node.empty)) stale_.push_back(place);
+    if (node.stale && (leaf.drawn || may_be_seen(box.place))) stale_.push_back(place);
     if (!leaf.drawn) return;
     ++drawn_;
     if (leaf.pixels <= options_.pixel_error || key.level == 0) return;
     queue_.push_back(place);
     std::push_heap(queue_.begin(), queue_.end(), worse());
+  }
+
+  // Whatever the terrain there is now.
+  bool may_be_seen(const Extent& place) const {
+    const HeightRange& h = options_.heights;
+    return h.lowest <= h.highest && frustum_.sees({place, h.lowest, h.highest});
   }
 
   // Is `key` a leaf, or split? If a larger leaf stands there instead, it is split first, as urgently as what
@@ -106,6 +111,7 @@ class Selector {
     for (const std::uint32_t k : stale_) {
       const Selection::Leaf& leaf = out_.leaves[k];
       const bool split = out_.tiles.at(leaf.key) == Selection::kSplit;
+      out_.stale |= !split;
       want(leaf.key, leaf.drawn ? std::min(leaf.pixels, options_.pixel_error)
                      : split    ? -1
                                 : options_.pixel_error);
@@ -132,7 +138,7 @@ class Selector {
   TileCache& cache_;
   Selection& out_;
   std::vector<std::uint32_t> queue_;  // heap of places
-  std::vector<std::uint32_t> stale_;  // places that were in sight
+  std::vector<std::uint32_t> stale_;  // places where something else may be in sight
   std::size_t drawn_ = 0;
 };
 

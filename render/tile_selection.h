@@ -11,6 +11,7 @@ namespace patchwork {
 struct SelectionOptions {
   double pixel_error = 1;         ///< pixels
   std::size_t most_tiles = 4096;  ///< that are drawn; the largest errors are refined first
+  HeightRange heights = {};  ///< metres: between which terrain may be now where a tile shows an old state
 };
 
 /// Tiles that cover what is seen without overlap; neighbours that share an edge differ by at most one level.
@@ -29,9 +30,8 @@ struct Selection {
   std::vector<Leaf> leaves;                          ///< those that were split have drawn == false
   std::vector<std::uint32_t> drawn;                  ///< places in `leaves`, the largest error first
   std::vector<Wanted> wanted;                        ///< the most wanted first
-  bool stale = false;  ///< a leaf, in sight or not, is made from a state that has changed there
-  ///< Error reached: the largest of all that is drawn and could be finer.
-  double pixels = 0;
+  bool stale = false;  ///< where a leaf shows a state that has changed, there may be something else in sight
+  double pixels = 0;   ///< error reached: the largest of all that is drawn and could be finer
   static constexpr std::uint32_t kSplit = UINT32_MAX;
 
   /// The place of the leaf that holds tile `key` of any level on the side of (x, y) nearest to it, see .cpp.

@@ -21,12 +21,20 @@ void note_made(const TileMakerCounts& before, const TileMakerCounts& after, Fram
   stats.blended.contributions -= before.blended.contributions;
 }
 
+HeightRange heights_of(const Database& db) {
+  HeightRange all;
+  for (const Grid& g : db.grids()) all.add(g.info.surface_heights());
+  return all;
+}
+
 }  // namespace
 
 TileSupply::TileSupply(std::shared_ptr<Device> device, const Database& db, const TileLattice& lattice,
                        vk::TileStore& store, double base, const RendererOptions& options)
-    : lattice_(lattice),
+    : db_(db),
+      lattice_(lattice),
       options_(options),
+      heights_(heights_of(db)),
       cache_(store.slots, options.policy),
       maker_(std::move(device), db, lattice, store, base,
              {.smoothness = options.smoothness, .composition = options.composition}, options.memory / 2,
@@ -39,14 +47,19 @@ TileSupply::TileSupply(std::shared_ptr<Device> device, const Database& db, const
 
 void TileSupply::select(const Frustum& frustum, FrameStats& stats) {
   const Stopwatch watch;
-  select_tiles(lattice_, frustum, {options_.pixel_error, most_tiles_}, cache_, selection_);
+  cache_.begin_selection();  // what this selection does not use may give its slot to what it wants
+  select_tiles(lattice_, frustum, {options_.pixel_error, most_tiles_, heights_}, cache_, selection_);
   wanted_.clear();
   for (const Selection::Wanted& w : selection_.wanted) wanted_.push_back(w.key);
   stats.select_ms += watch.milliseconds();
 }
 
-// Level by level, the coarsest first; false if nothing could be made.
-bool TileSupply::make(std::vector<TileKey> tiles) {
+// The most wanted, in half of the slots that can be had (a tile's four children at least): what turns out to
+// be wanted more, once these are there, finds room too. Level by level, the coarsest first; false if nothing
+// could be made.
+bool TileSupply::make(const std::vector<TileKey>& wanted) {
+  const std::size_t most = std::max<std::size_t>(4, cache_.room() / 2);
+  std::vector<TileKey> tiles(wanted.begin(), wanted.begin() + std::ptrdiff_t(std::min(most, wanted.size())));
   std::stable_sort(tiles.begin(), tiles.end(),
                    [](const TileKey& a, const TileKey& b) { return a.level > b.level; });
   std::size_t made = 0;
@@ -74,18 +87,17 @@ bool TileSupply::make_fetched() {
 
 const Selection& TileSupply::update(const Frustum& frustum, FrameStats& stats) {
   const TileMakerCounts before = maker_.counts();
-  cache_.begin_frame();
   select(frustum, stats);
   if (fetcher_) {
     // Without a slot to be had, what would be fetched could not be made.
-    if (!cache_.has_room()) wanted_.clear();
+    if (cache_.room() == 0) wanted_.clear();
     fetcher_->want(wanted_);
     if (make_fetched() || selection_.drawn.empty()) select(frustum, stats);
   } else {
     while (!wanted_.empty() && make(wanted_)) select(frustum, stats);
   }
   note_made(before, maker_.counts(), stats);
-  stats.tiles_wanted = cache_.has_room() ? selection_.wanted.size() : 0;
+  stats.tiles_wanted = cache_.room() > 0 ? selection_.wanted.size() : 0;
   // Blocks of better tiles are simplified until they too just keep to what was asked.
   if (!selection_.drawn.empty()) stats.pixels_reached = std::max(selection_.pixels, options_.pixel_error);
   for (const std::uint32_t k : selection_.drawn) {
@@ -97,7 +109,7 @@ const Selection& TileSupply::update(const Frustum& frustum, FrameStats& stats) {
 }
 
 void TileSupply::release(bool moved, const std::vector<Extent>& changed, bool another_lattice) {
-  if (moved) maker_.restart();
+  if (moved) maker_.restart(), heights_ = heights_of(db_);
   if (another_lattice) cache_.clear();
   for (const Extent& e : changed) cache_.invalidate(lattice_, e);
   if (fetcher_) fetcher_->release(moved);

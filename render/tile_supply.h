@@ -33,11 +33,13 @@ class TileSupply {
 
  private:
   void select(const Frustum& frustum, FrameStats& stats);
-  bool make(std::vector<TileKey> tiles);
+  bool make(const std::vector<TileKey>& wanted);
   bool make_fetched();
 
+  const Database& db_;
   const TileLattice& lattice_;
   RendererOptions options_;
+  HeightRange heights_;  // of all surfaces
   TileCache cache_;
   TileMaker maker_;
   std::unique_ptr<TileFetcher> fetcher_;  // only in the background

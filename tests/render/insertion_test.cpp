@@ -101,6 +101,59 @@ TEST_F(InsertionTest, OneBesideAllDataIsSeen) {
   EXPECT_GT(covered(r), before + 1000);
 }
 
+// What is out of sight as it was may rise into it.
+TEST_F(InsertionTest, OneThatRisesIntoSightIsSeen) {
+  Database db = reader();
+  const RendererOptions options{.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20};
+  Renderer r(test_device(), db, options);
+  const Extent e = db.extent();
+  const double y = 0.5 * (e.ymin + e.ymax);
+  const Camera camera{{e.xmin + 50, y, 900}, {e.xmax, y, 900}, 30, kWidth, kHeight};
+  r.draw(camera);
+  EXPECT_EQ(covered(r), 0u);
+  {
+    Database writer = folder_.database();
+    GridFile file = surveys()[0];
+    file.accuracy = 0.001;
+    file.at = [](int, int) { return 950.0; };
+    file.width = file.height = 40;
+    file.geotransform[0] = 0.5 * (e.xmin + e.xmax), file.geotransform[3] = y + 20 * file.geotransform[1];
+    folder_.add(writer, file, "tower");
+  }
+  EXPECT_TRUE(r.refresh(db));
+  r.draw(camera);
+  EXPECT_GT(covered(r), 1000u);
+  Renderer fresh(test_device(), db, options);
+  fresh.draw(camera);
+  EXPECT_NEAR(double(covered(r)), double(covered(fresh)), 0.02 * double(covered(fresh)));
+}
+
+// Triangles that look away may show through the gaps that coarse and old tiles leave.
+TEST_F(InsertionTest, WhatLooksAwayIsDrawnWhileTilesAreCoarseOrStale) {
+  Database db = reader();
+  RendererOptions options{
+      .width = kWidth, .height = kHeight, .pixel_error = 0.5, .memory = std::size_t{128} << 20};
+  options.realtime = true, options.make_ms = 1;
+  Renderer r(test_device(), db, options);
+  const Camera camera{{800, 300, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+  std::size_t coarse = 0, stale = 0;
+  const auto settle = [&] {
+    FrameStats last = r.draw(camera);
+    for (int n = 0; n < 5000 && (last.tiles_wanted > 0 || last.tiles_stale > 0); ++n) {
+      coarse += last.tiles_coarse > 0, stale += last.tiles_stale > 0;
+      EXPECT_FALSE(last.front_only && last.tiles_coarse + last.tiles_stale > 0);
+      last = r.draw(camera);
+    }
+    return last;
+  };
+  EXPECT_TRUE(settle().front_only);
+  EXPECT_GT(coarse, 0u);
+  insert(2);
+  for (int n = 0; n < 5000 && !r.refresh(db); ++n) r.draw(camera);
+  EXPECT_TRUE(settle().front_only);
+  EXPECT_GT(stale, 0u);
+}
+
 TEST_F(InsertionTest, AskingForWhatIsNewHoldsNoWorkerUnlessThereIsSome) {
   Database db = reader();
   RendererOptions options{.width = kWidth, .height = kHeight, .memory = std::size_t{128} << 20};

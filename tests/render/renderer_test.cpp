@@ -173,6 +173,26 @@ TEST_F(TerrainTest, WhatLooksAwayIsLeftOutOnlyWhereItIsHidden) {
   }
 }
 
+// Where the pool is too small for what is asked, the tiles that matter most get it: asking for more makes
+// nothing worse.
+TEST_F(TerrainTest, AskingForMoreThanThePoolHoldsReachesNoLess) {
+  const Camera camera{{300, 200, 700}, {900, 900, 300}, 60, kWidth, kHeight};
+  std::vector<double> reached;
+  for (const double asked : {4.0, 2.0, 1.0, 0.5, 0.25, 0.1}) {
+    Renderer r(test_device(), db(),
+               {.width = kWidth, .height = kHeight, .pixel_error = asked, .memory = std::size_t{40} << 20});
+    const FrameStats s = r.draw(camera);
+    std::printf("asked %g, reached %g: %zu tiles of %u\n", asked, s.pixels_reached, s.tiles_drawn,
+                r.cache().slots());
+    reached.push_back(s.pixels_reached);
+    const std::size_t made = s.tiles_made;
+    EXPECT_EQ(r.draw(camera).tiles_made, 0u) << "asked " << asked << ", made " << made;
+  }
+  EXPECT_EQ(reached.front(), 4);
+  EXPECT_GT(reached.back(), 0.1) << "the pool is too small for that";
+  for (std::size_t k = 1; k < reached.size(); ++k) EXPECT_LE(reached[k], reached[k - 1]);
+}
+
 // An eye inside the boxes of tiles, a hand above the ground, looking down, and looking away from everything.
 TEST_F(TerrainTest, NearPlane) {
   Renderer r = renderer(1);

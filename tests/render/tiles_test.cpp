@@ -86,7 +86,7 @@ TEST(TileCache, GivesNoSlotOfThisFrameAwayAndKnowsWhoHasWhich) {
     TileCache cache(8, policy);
     std::set<TileKey> used;
     for (int n = 0; n < 2000; ++n) {
-      if (n % 7 == 0) cache.begin_frame(), used.clear();
+      if (n % 7 == 0) cache.begin_selection(), used.clear();
       const TileKey key{0, int(random() % 6), int(random() % 5)};
       const TileCache::Node* node = cache.find(key);
       if (node && node->drawable()) {
@@ -113,9 +113,9 @@ TEST(TileCache, TheLeastRecentlyUsedGoesFirst) {
   const TileKey a{0, 0, 0}, b{0, 1, 0}, c{0, 2, 0};
   cache.put(a, {}, cache.take_slot());
   cache.put(b, {}, cache.take_slot());
-  cache.begin_frame();
+  cache.begin_selection();
   cache.use(a, 1);
-  cache.begin_frame();
+  cache.begin_selection();
   cache.put(c, {}, cache.take_slot());
   EXPECT_TRUE(cache.find(a)->drawable());
   EXPECT_EQ(cache.find(b), nullptr);
@@ -263,12 +263,12 @@ TEST(TileSelection, NeverDrawsMoreThanItMay) {
 // what is not drawn itself at last.
 TEST(TileSelection, WhatAChangeTouchesIsWantedBehindWhatIsMissing) {
   const std::uint64_t seed = test_seed(15);
-  std::size_t touched = 0, split = 0;
+  std::size_t touched = 0, split = 0, hidden = 0;
   for (std::uint64_t n = 0; n < 20; ++n) {
     Woods woods(seed + n);
     const Frustum frustum(woods.camera());
     Selection before, after;
-    const SelectionOptions options{.pixel_error = 1};
+    const SelectionOptions options{.pixel_error = 1, .heights = {-2000, 600}};
     select_tiles(woods.lattice(), frustum, options, woods.cache, before);
     const Extent change{500, 600, 900, 1100};
     std::set<TileKey> stale;
@@ -280,7 +280,10 @@ TEST(TileSelection, WhatAChangeTouchesIsWantedBehindWhatIsMissing) {
       const TileCache::Node& node = *woods.cache.find(key);
       const Box3 around{woods.lattice().bounds(key), node.facts.lowest - node.facts.error,
                         node.facts.highest + node.facts.error};
-      if (node.empty || frustum.sees(around)) stale.insert(key);
+      const bool shown = !node.empty && frustum.sees(around);
+      const bool may_be = frustum.sees({around.place, options.heights.lowest, options.heights.highest});
+      if (shown || may_be) stale.insert(key);
+      hidden += !shown && may_be && !node.empty;
     }
     woods.cache.invalidate(woods.lattice(), change);
     select_tiles(woods.lattice(), frustum, options, woods.cache, after);
@@ -300,6 +303,7 @@ TEST(TileSelection, WhatAChangeTouchesIsWantedBehindWhatIsMissing) {
   }
   EXPECT_GT(touched, 100u);
   EXPECT_GT(split, 20u);
+  EXPECT_GT(hidden, 5u) << "out of sight as they were";
 }
 
 // ---- seams

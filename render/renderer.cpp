@@ -303,17 +303,7 @@ void Renderer::change(const SceneEffects& to) {
 
 std::vector<float> Renderer::depth() const {
   impl_->read_back(false, true);
-  const Camera& c = impl_->camera;
-  std::vector<float> metres(std::size_t(c.width) * std::size_t(c.height));
-  const float* from = impl_->target.depths();
-  for (int y = 0; y < c.height; ++y)
-    for (int x = 0; x < c.width; ++x) {
-      const std::size_t k = std::size_t(y) * std::size_t(c.width) + std::size_t(x);
-      metres[k] = from[k] > 0
-                      ? float(axial_of_depth(double(from[k]), kNear) / axial_share(c, x + 0.5, y + 0.5))
-                      : NAN;
-    }
-  return metres;
+  return impl_->target.metres(impl_->camera, kNear);
 }
 
 bool Renderer::refresh(Database& db) {

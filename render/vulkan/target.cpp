@@ -1,5 +1,7 @@
 #include "render/vulkan/target_impl.h"
 
+#include <cmath>
+
 namespace patchwork::vk {
 
 namespace {
@@ -103,6 +105,19 @@ void Target::read_back(VkCommandBuffer commands, bool color, bool depth) {
   if (color) copy(color_, color_out_);
   if (depth) copy(depth_, depth_out_);
   barrier(commands);
+}
+
+std::vector<float> Target::metres(Camera camera, double near) const {
+  camera.width = int(size().width), camera.height = int(size().height);
+  std::vector<float> metres;
+  metres.reserve(std::size_t(camera.width) * std::size_t(camera.height));
+  const float* from = depths();
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x, ++from)
+      metres.push_back(
+          *from > 0 ? float(axial_of_depth(double(*from), near) / axial_share(camera, x + 0.5, y + 0.5))
+                    : NAN);
+  return metres;
 }
 
 }  // namespace patchwork::vk

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "render/camera.h"
 #include "render/vulkan/texture_impl.h"
 
 namespace patchwork::vk {
@@ -26,6 +27,9 @@ class Target {
   void read_back(VkCommandBuffer commands, bool color, bool depth);
   const std::uint32_t* pixels() const { return reinterpret_cast<const std::uint32_t*>(color_out_.mapped()); }
   const float* depths() const { return reinterpret_cast<const float*>(depth_out_.mapped()); }
+  /// The depths, metres along the ray through each pixel's centre, row-major; NaN where there is nothing.
+  /// `camera`: as it was drawn with, but for its size; `near`: metres.
+  std::vector<float> metres(Camera camera, double near) const;
 
  private:
   Texture color_, depth_;

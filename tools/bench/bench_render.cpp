@@ -1,5 +1,5 @@
 // A flight at several pixel errors, each frame also drawn as the whole mesh, as chunks, by the other way to
-// tessellate, and as published.
+// tessellate, and as published; and how far pixels lie from the best surface there is.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,12 +8,14 @@
 #include "tools/bench/bench.h"
 #include "tools/bench/process.h"
 #include "tools/bench/render_peers.h"
+#include "tools/error_figures.h"
 
 namespace patchwork::cli {
 
 namespace {
 
 constexpr int kFramesARun = 12;
+constexpr int kMeasured = 5, kEvery = 3;  // of so many frames of a flight, each so many pixels and rows
 constexpr std::size_t kMeshVertices = std::size_t{2049} * 2049;  // a larger grid is not drawn as one mesh
 
 // Back and forth over the terrain, from a third of the extent's height up to a little over the summits.
@@ -33,9 +35,18 @@ Flight flight_over(const Database& db, int frames) {
 
 // Times of one flight, a column for each way of drawing.
 struct Times {
-  std::vector<double> frame, other_frame, ours, other, published, mesh, chunked, screen, bare;
+  std::vector<double> frame, other_frame, ours, other, published, mesh, chunked, screen, bare, covered;
   std::vector<double> triangles, made;
   double pixels = 0;
+  std::vector<double> ours_off, mesh_off, chunked_off, published_off;  // pixels, of some frames
+};
+
+// One flight, and how far pixels were from the best surface there is; of the mesh where there is one.
+struct Flown {
+  std::string name;
+  Work draw, frame;
+  Spread mesh_ms, chunked_ms;
+  ErrorFigures ours, mesh, chunked, published;
 };
 
 double quantile(std::vector<double> v, double q) {
@@ -43,16 +54,55 @@ double quantile(std::vector<double> v, double q) {
   return v.empty() ? 0 : v[std::min(v.size() - 1, std::size_t(q * double(v.size())))];
 }
 
+Json json_of(const ErrorFigures& f) { return {{"max", f.max}, {"p99", f.p99}, {"rms", f.rms}}; }
+
+// The same flight at several pixel errors, compared where the largest errors measured are the same: chunks
+// that are as coarse as they may be to have no larger one than ours, and ours where it has no larger one than
+// the mesh.
+std::vector<Work> at_equal_errors(const std::vector<Flown>& flights) {
+  std::vector<Work> all;
+  const Flown* as_mesh = nullptr;
+  for (const Flown& f : flights) {
+    const Flown* chunks = nullptr;
+    for (const Flown& g : flights)
+      if (g.chunked.max <= f.ours.max && (!chunks || g.chunked.max > chunks->chunked.max)) chunks = &g;
+    if (f.ours.max <= f.mesh.max && (!as_mesh || f.ours.max > as_mesh->ours.max)) as_mesh = &f;
+    if (!chunks) continue;
+    const Json answer{
+        {"pixel_error_measured", {{"ours", json_of(f.ours)}, {"chunked", json_of(chunks->chunked)}}},
+        {"chunks_of", chunks->name}};
+    all.push_back({"draw " + f.name + ", chunks of no larger error",
+                   "ms",
+                   true,
+                   f.draw.ours,
+                   {{"chunked", chunks->chunked_ms}},
+                   answer});
+  }
+  if (!as_mesh) return all;
+  const Json answer{
+      {"pixel_error_measured", {{"ours", json_of(as_mesh->ours)}, {"full mesh", json_of(as_mesh->mesh)}}}};
+  all.push_back({"draw " + as_mesh->name + ", no larger error than the mesh's",
+                 "ms",
+                 true,
+                 as_mesh->draw.ours,
+                 {{"full mesh", as_mesh->mesh_ms}},
+                 answer});
+  return all;
+}
+
 class Flights {
  public:
   Flights(const Database& db, const BenchOptions& o)
-      : db_(db), device_(Device::open()), frames_(o.runs * kFramesARun) {
+      : db_(db),
+        device_(Device::open()),
+        frames_(o.runs * kFramesARun),
+        best_(db, extract(db, {.error = 0}).patches, {.smoothness = RendererOptions{}.smoothness}) {
     const Grid& g = db.grids().front();
     const auto vertices = std::size_t(g.info.shape.width()) * std::size_t(g.info.shape.height());
     mesh_ = vertices <= kMeshVertices ? &g : nullptr;
   }
 
-  std::vector<Work> fly(int width, int height, double pixel_error) {
+  Flown fly(int width, int height, double pixel_error) {
     RendererOptions options{.width = width, .height = height, .pixel_error = pixel_error};
     Renderer ours(device_, db_, options);
     const bool mesh = ours.tessellation() == Tessellation::mesh;
@@ -77,12 +127,24 @@ class Flights {
       t.other_frame.push_back(a.total_ms), t.other.push_back(a.factors_ms + a.draw_ms);
       const FrameStats p = published.draw(camera);
       t.published.push_back(p.factors_ms + p.draw_ms);
+      const bool measured = k % std::max(1, frames_ / kMeasured) == 0;
+      const auto measure = [&](std::vector<double>& all, const std::vector<float>& depth) {
+        const std::vector<double> off = screen_distances(best_, camera, depth, kEvery);
+        all.insert(all.end(), off.begin(), off.end());
+      };
       t.chunked.push_back(peers.chunked(ours));
+      if (measured) {
+        measure(t.chunked_off, peers.depth(camera));
+        measure(t.ours_off, ours.depth()), measure(t.published_off, published.depth());
+      }
       t.screen.push_back(peers.full_screen(ours));
       t.bare.push_back(t.screen.back() + peers.plain(ours, s.triangles));
-      if (mesh_) t.mesh.push_back(peers.full_mesh(camera));
+      t.covered.push_back(t.screen.back() + peers.covering(s.triangles));
+      if (!mesh_) continue;
+      t.mesh.push_back(peers.full_mesh(camera));
+      if (measured) measure(t.mesh_off, peers.depth(camera));
     }
-    return works(t, fmt::format("{} x {} at {:g} px", width, height, pixel_error),
+    return flown(t, fmt::format("{} x {} at {:g} px", width, height, pixel_error),
                  mesh ? "hardware tessellation" : "mesh by compute");
   }
 
@@ -90,29 +152,44 @@ class Flights {
   // The first frame makes all tiles, and is not one of the flight.
   static Spread spread(const std::vector<double>& v) { return Spread::of({v.begin() + 1, v.end()}); }
 
-  std::vector<Work> works(const Times& t, const std::string& name, const std::string& other) const {
+  Flown flown(Times& t, const std::string& name, const std::string& other) const {
+    Flown f{.name = name,
+            .draw = {},
+            .frame = {},
+            .mesh_ms = {},
+            .chunked_ms = spread(t.chunked),
+            .ours = figures_of(t.ours_off),
+            .mesh = figures_of(t.mesh_off),
+            .chunked = figures_of(t.chunked_off),
+            .published = figures_of(t.published_off)};
+    Json error{
+        {"ours", json_of(f.ours)}, {"published", json_of(f.published)}, {"chunked", json_of(f.chunked)}};
+    if (mesh_) f.mesh_ms = spread(t.mesh), error["full mesh"] = json_of(f.mesh);
     const Json answer{{"device", device_->name()},
                       {"frames", t.ours.size() - 1},
                       {"triangles_median", quantile(t.triangles, 0.5)},
                       {"tiles_made_a_frame", quantile(t.made, 0.5)},
                       {"pixel_error_reached", t.pixels},
+                      {"pixel_error_measured", error},
                       {"draw_p99_ms", quantile({t.ours.begin() + 1, t.ours.end()}, 0.99)},
                       {"frame_p99_ms", quantile({t.frame.begin() + 1, t.frame.end()}, 0.99)}};
-    Work draw{"draw " + name, "ms", true, spread(t.ours), {}, answer};
-    if (!t.mesh.empty()) draw.peers.emplace_back("full mesh", spread(t.mesh));
-    draw.peers.emplace_back("chunked", spread(t.chunked));
+    Work& draw = f.draw = {"draw " + name, "ms", true, spread(t.ours), {}, answer};
+    if (mesh_) draw.peers.emplace_back("full mesh", f.mesh_ms);
+    draw.peers.emplace_back("chunked", f.chunked_ms);
     draw.peers.emplace_back(other, spread(t.other));
     draw.peers.emplace_back("published", spread(t.published));
     draw.peers.emplace_back("full screen", spread(t.screen));
     draw.peers.emplace_back("full screen + plain", spread(t.bare));
-    Work frame{"frame " + name + ", tiles made", "ms", true, spread(t.frame), {}, answer};
-    frame.peers.emplace_back(other, spread(t.other_frame));
-    return {draw, frame};
+    draw.peers.emplace_back("full screen + plain over it", spread(t.covered));
+    f.frame = {"frame " + name + ", tiles made", "ms", true, spread(t.frame), {}, answer};
+    f.frame.peers.emplace_back(other, spread(t.other_frame));
+    return f;
   }
 
   const Database& db_;
   std::shared_ptr<Device> device_;
   int frames_;
+  Blend best_;
   const Grid* mesh_;
 };
 
@@ -131,9 +208,12 @@ std::vector<Work> bench_render(const BenchOptions& o) {
   const Database db = Database::open(path);
   Flights flights(db, o);
   std::vector<Work> all;
-  for (const auto& [width, height] : {std::pair{1280, 720}, std::pair{1920, 1080}})
-    for (const double pixels : {1.0, 2.0, 4.0})
-      for (Work& w : flights.fly(width, height, pixels)) all.push_back(std::move(w));
+  for (const auto& [width, height] : {std::pair{1280, 720}, std::pair{1920, 1080}}) {
+    std::vector<Flown> flown;
+    for (const double pixels : {1.0, 2.0, 4.0, 8.0}) flown.push_back(flights.fly(width, height, pixels));
+    for (const Flown& f : flown) all.push_back(f.draw), all.push_back(f.frame);
+    for (Work& w : at_equal_errors(flown)) all.push_back(std::move(w));
+  }
   return all;
 }
 

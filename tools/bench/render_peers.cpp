@@ -20,6 +20,12 @@ constexpr std::uint32_t kMeshVert[] = {
 constexpr std::uint32_t kMeshFrag[] = {
 #include "peer_mesh.frag.inc"
 };
+constexpr std::uint32_t kPlainVert[] = {
+#include "peer_plain.vert.inc"
+};
+constexpr std::uint32_t kPlainFrag[] = {
+#include "peer_plain.frag.inc"
+};
 constexpr std::uint32_t kChunkVert[] = {
 #include "peer_chunk.vert.inc"
 };
@@ -124,10 +130,10 @@ struct RenderPeers::Impl {
   const Device::Impl& card;
   vk::Target target;
   vk::Bindings mesh_bindings, tile_bindings;
-  vk::OwnedPipeline mesh_pipeline, chunk_pipeline, screen_pipeline;
-  VkDescriptorSet mesh_set = VK_NULL_HANDLE, tile_set = VK_NULL_HANDLE;
-  vk::OwnedSets mesh_sets, tile_sets;
-  vk::Buffer frame, draws, chunk_indices;
+  vk::OwnedPipeline mesh_pipeline, plain_pipeline, chunk_pipeline, screen_pipeline;
+  VkDescriptorSet mesh_set = VK_NULL_HANDLE, plain_set = VK_NULL_HANDLE, tile_set = VK_NULL_HANDLE;
+  vk::OwnedSets mesh_sets, plain_sets, tile_sets;
+  vk::Buffer frame, plain_block, plain_indices, draws, chunk_indices;
   vk::OwnedView draw_texels;
   std::uint32_t chunk_index_count = 0;
   std::unique_ptr<Mesh> mesh;
@@ -145,11 +151,14 @@ struct RenderPeers::Impl {
         mesh_bindings(card, kMeshTypes, 0, kStages),
         tile_bindings(card, kTileTypes, 0, kStages),
         mesh_pipeline(triangles(mesh_bindings, target.pass(), kMeshVert, kMeshFrag)),
+        plain_pipeline(triangles(mesh_bindings, target.pass(), kPlainVert, kPlainFrag)),
         chunk_pipeline(triangles(tile_bindings, target.pass(), kChunkVert, kSlopesFrag)),
         screen_pipeline(triangles(tile_bindings, target.pass(), kScreenVert, kSlopesFrag)),
         mesh_sets(mesh_bindings.make_set(mesh_set)),
+        plain_sets(mesh_bindings.make_set(plain_set)),
         tile_sets(tile_bindings.make_set(tile_set)),
         frame(card, sizeof(vk::FrameBlock), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, vk::Where::upload),
+        plain_block(card, sizeof(MeshBlock), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, vk::Where::upload),
         draws(card, kMostDraws * sizeof(TileDraw), kTexelBuffer, vk::Where::upload),
         draw_texels(vk::texels(card, draws, VK_FORMAT_R32G32B32A32_UINT)),
         commands(card),
@@ -158,6 +167,7 @@ struct RenderPeers::Impl {
     chunk_index_count = std::uint32_t(all.size());
     chunk_indices = vk::Buffer(card, all.size() * 4, VK_BUFFER_USAGE_INDEX_BUFFER_BIT, vk::Where::upload);
     std::memcpy(chunk_indices.mapped(), all.data(), all.size() * 4);
+    mesh_bindings.bind(plain_set, 0, plain_block), mesh_bindings.bind(plain_set, 1, draw_texels);
     if (!grid) return;
     mesh = std::make_unique<Mesh>(card, db, *grid);
     mesh_bindings.bind(mesh_set, 0, mesh->block), mesh_bindings.bind(mesh_set, 1, mesh->texels);
@@ -216,6 +226,34 @@ double RenderPeers::full_mesh(const Camera& camera) {
 
 double RenderPeers::plain(const Renderer& renderer, std::size_t n) { return impl_->draw_chunks(renderer, n); }
 double RenderPeers::chunked(const Renderer& renderer) { return impl_->draw_chunks(renderer, SIZE_MAX); }
+
+// Cells as square as their number allows.
+double RenderPeers::covering(std::size_t n) {
+  Impl& p = *impl_;
+  const VkExtent2D size = p.target.size();
+  const double cells = double(std::max<std::size_t>(n, 2)) / 2;
+  const int columns = std::max(1, int(std::sqrt(cells * size.width / size.height)));
+  const int rows = std::max(1, int(cells / columns));
+  const std::vector<std::uint32_t> all = grid_indices(columns + 1, rows + 1);
+  if (p.plain_indices.bytes() < 4 * all.size())
+    p.plain_indices = vk::Buffer(p.card, 4 * all.size(), VK_BUFFER_USAGE_INDEX_BUFFER_BIT, vk::Where::upload);
+  std::memcpy(p.plain_indices.mapped(), all.data(), 4 * all.size());
+  const MeshBlock block{.clip = {},
+                        .from = {-1, -1, 0, float(columns + 1)},
+                        .steps = {2 / float(columns), 0, 0, 2 / float(rows)}};
+  std::memcpy(p.plain_block.mapped(), &block, sizeof block);
+  return p.measure(p.mesh_bindings, p.plain_set, p.plain_pipeline.get(), [&](VkCommandBuffer c) {
+    vkCmdBindIndexBuffer(c, p.plain_indices.get(), 0, VK_INDEX_TYPE_UINT32);
+    vkCmdDrawIndexed(c, std::uint32_t(all.size()), 1, 0, 0, 0);
+  });
+}
+
+std::vector<float> RenderPeers::depth(const Camera& camera) {
+  Impl& p = *impl_;
+  p.target.read_back(p.commands.begin(), false, true);
+  p.commands.submit(), p.commands.wait();
+  return p.target.metres(camera, Renderer::kNear);
+}
 
 double RenderPeers::full_screen(const Renderer& renderer) {
   impl_->take(renderer);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "render/renderer.h"
 
@@ -17,10 +18,14 @@ class RenderPeers {
   double full_mesh(const Camera& camera);
   /// The tiles that `renderer` drew last, each as 64 x 64 cells; as chunks are drawn, but for their skirts.
   double chunked(const Renderer& renderer);
-  /// A full-screen triangle with the same shading; and so many plain triangles of those tiles, the same share
-  /// of each.
+  /// A full-screen triangle with the same shading.
   double full_screen(const Renderer& renderer);
+  /// So many indexed triangles without shading: of those tiles, the same share of each; and all over the
+  /// picture, where each is seen.
   double plain(const Renderer& renderer, std::size_t triangles);
+  double covering(std::size_t triangles);
+  /// Of what was drawn last: as Renderer::depth().
+  std::vector<float> depth(const Camera& camera);
 
  private:
   struct Impl;

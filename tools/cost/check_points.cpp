@@ -18,15 +18,6 @@ double slack(double height, bool float32) {
 
 }  // namespace
 
-ErrorFigures figures_of(std::vector<double>& distances) {
-  if (distances.empty()) return {};
-  double squares = 0;
-  for (const double d : distances) squares += d * d;
-  std::sort(distances.begin(), distances.end());
-  const std::size_t n = distances.size();
-  return {distances.back(), distances[std::size_t(0.99 * double(n - 1))], std::sqrt(squares / double(n))};
-}
-
 CheckPoints::CheckPoints(const Database& db, const Extent& extent, int count) {
   const int side = std::max(2, int(std::lround(std::sqrt(double(count)))));
   const double dx = (extent.xmax - extent.xmin) / side, dy = (extent.ymax - extent.ymin) / side;

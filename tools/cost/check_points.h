@@ -27,7 +27,4 @@ class CheckPoints {
   std::vector<double> x_, y_, best_, best_bound_;
 };
 
-/// Of distances that are overwritten; zeros where there are none.
-ErrorFigures figures_of(std::vector<double>& distances);
-
 }  // namespace patchwork::cli

@@ -9,6 +9,7 @@
 #include "query/cost_model.h"
 #include "tools/cli.h"
 #include "tools/cost/rounds.h"
+#include "tools/error_figures.h"
 #include "tools/spread.h"
 
 namespace patchwork::cli {
@@ -25,11 +26,6 @@ struct CostOptions {
 
 /// The best answer may have this many patches; a database with more is looked at in its middle.
 inline constexpr std::size_t kMostPatches = 60000;
-
-/// Errors in the unit of a row: metres, or pixels of the view.
-struct ErrorFigures {
-  double max = 0, p99 = 0, rms = 0;
-};
 
 /// One setting of one knob.
 struct CostRow {

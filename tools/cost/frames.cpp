@@ -89,28 +89,8 @@ class Frames {
     ms.light.push_back(std::max(0., s.total_ms - others));
   }
 
-  // Vertical distance of what each pixel shows to the best surface there, as it is seen, in pixels.
-  std::vector<double> distances(const std::vector<float>& depth) const {
-    const Camera& camera = scene_.camera;
-    std::vector<double> x, y, z, scale;
-    for (int r = 0; r < camera.height; ++r)
-      for (int c = 0; c < camera.width; ++c) {
-        const float d = depth[std::size_t(r) * std::size_t(camera.width) + std::size_t(c)];
-        if (std::isnan(d)) continue;
-        const glm::dvec3 p = ray(camera, c, r).at(double(d));
-        const Seen low = see(camera, {p.x, p.y, p.z - 0.005}), high = see(camera, {p.x, p.y, p.z + 0.005});
-        x.push_back(p.x), y.push_back(p.y), z.push_back(p.z);
-        scale.push_back(std::hypot(high.x - low.x, high.y - low.y) / 0.01);
-      }
-    std::vector<double> height(x.size()), all;
-    best_.at_points(x, y, {.height = height, .bound = {}, .source = {}, .patch = {}});
-    for (std::size_t k = 0; k < x.size(); ++k)  // the outline of the data is drawn to a cell
-      if (!std::isnan(height[k])) all.push_back(std::abs(z[k] - height[k]) * scale[k]);
-    return all;
-  }
-
   void judge(const Renderer& renderer, const FrameStats& s, CostRow& row) const {
-    std::vector<double> off = distances(renderer.depth());
+    std::vector<double> off = screen_distances(best_, scene_.camera, renderer.depth());
     row.patches = s.patches_sent, row.bytes = s.bytes_up;
     if (renderer.tessellation() != Tessellation::published) {
       row.bound = row.bound_p99 = s.pixels_reached;

@@ -11,12 +11,17 @@ namespace patchwork {
 /// time, the last made going first. Not safe for concurrent use.
 class UnfinishedFiles {
  public:
-  explicit UnfinishedFiles(std::vector<std::string> paths);
+  /// open: somebody else may be at work on them; a first signal waits until that is known, a second one does
+  /// not.
+  enum class Fate { remove, open };
+  explicit UnfinishedFiles(std::vector<std::string> paths, Fate fate = Fate::remove);
   ~UnfinishedFiles();
   UnfinishedFiles(const UnfinishedFiles&) = delete;
   UnfinishedFiles& operator=(const UnfinishedFiles&) = delete;
   /// They are finished, or gone under another name: they stay.
   void keep();
+  /// From now on. A signal that waits ends the process when they are no longer open.
+  void set(Fate fate);
 
  private:
   static void remove_all_and_die(int signal);
@@ -25,7 +30,7 @@ class UnfinishedFiles {
 
   const std::vector<std::string> paths_;
   UnfinishedFiles* const outer_;
-  volatile bool kept_ = false;
+  volatile bool kept_ = false, open_;
 };
 
 }  // namespace patchwork

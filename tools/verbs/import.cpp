@@ -109,18 +109,25 @@ class ImportRun {
       throw Error(files.front(), "it has a CRS and the database has none: their places cannot be compared",
                   "make a database with --crs and import its grids there");
     for (const std::string& w : source.warnings()) note(common_, files.front() + ": " + w);
-    if (!settled)
-      db = Database::open_or_create(o_.database, "", common_.memory);  // the CRS comes with the grid
+    // A database that this run makes goes with an interrupt, too, if it is empty and as long as nobody else
+    // can write to it: while the import's progress is between 0 and 1.
+    const std::string& path = o_.database;
+    UnfinishedFiles made({path, path + "-wal", path + "-shm"}, UnfinishedFiles::Fate::open);
+    if (!settled) db = Database::open_or_create(path, "", common_.memory);  // the CRS comes with the grid
+    if (!db->made_file()) made.keep();
     std::optional<Comparison> compared;
     ImportReport report;
     try {
       if (o_.dry_run) compared = compare(*db, source);
-      report = import(*db, source, files);
+      report = import(*db, source, files, made);
     } catch (...) {
+      made.set(UnfinishedFiles::Fate::open);
       if (db->made_file()) db->remove_if_empty();
+      made.keep();
       throw;
     }
     if (o_.dry_run && db->made_file()) db->remove_if_empty();
+    made.keep();
     std::vector<std::string> warnings = source.warnings();
     if (report.quantisation > std::max(report.accuracy, o_.tolerance)) {
       warnings.push_back(fmt::format(
@@ -133,34 +140,23 @@ class ImportRun {
     return json_of(report, warnings, compared);
   }
 
-  ImportReport import(Database& db, const RasterSource& source, const std::vector<std::string>& files) const {
+  ImportReport import(Database& db, const RasterSource& source, const std::vector<std::string>& files,
+                      UnfinishedFiles& made) const {
     const std::string stem = std::filesystem::path(files.front()).stem().string();
     const std::string name = !o_.name.empty() ? o_.name : !o_.replace.empty() ? o_.replace : stem;
     const double megasamples = double(source.width()) * source.height() / 1e6;
     ProgressBar bar(common_, "import " + name, megasamples, "Msamples");
-    // A database that this run made goes with an interrupt, too, if it is empty and as long as nobody else
-    // can write to it: while progress is between 0 and 1.
-    std::optional<UnfinishedFiles> unfinished;
-    const auto others_may_write = [&] {
-      if (unfinished) unfinished->keep();
-    };
-    try {
-      return db.import(source, {.name = name,
-                                .memory = common_.memory,
-                                .dry_run = o_.dry_run,
-                                .tolerance = o_.tolerance,
-                                .replace = o_.replace,
-                                .progress = [&](double share) {
-                                  if (share == 0 && db.made_file() && db.grids().empty())
-                                    unfinished.emplace(std::vector<std::string>{db.path(), db.path() + "-wal",
-                                                                                db.path() + "-shm"});
-                                  if (share == 1) others_may_write();
-                                  bar.show(share);
-                                }});
-    } catch (...) {
-      others_may_write();
-      throw;
-    }
+    return db.import(source, {.name = name,
+                              .memory = common_.memory,
+                              .dry_run = o_.dry_run,
+                              .tolerance = o_.tolerance,
+                              .replace = o_.replace,
+                              .progress = [&](double share) {
+                                if (share == 0 && db.grids().empty()) made.set(UnfinishedFiles::Fate::remove);
+                                if (share == 0 && !db.grids().empty()) made.keep();
+                                if (share == 1) made.set(UnfinishedFiles::Fate::open);
+                                bar.show(share);
+                              }});
   }
 
   const Options& o_;

@@ -180,8 +180,9 @@ struct Renderer::Impl {
     const TileCache::Node* node = leaf ? supply.cache().find(leaf->key) : nullptr;
     const double high = camera.tan_half(),
                  corner = kNear * std::hypot(1, high, high * camera.width / camera.height);
-    return node && !node->empty && !node->stale &&
-           camera.eye.z > node->facts.highest + node->facts.error + corner;
+    if (!node || node->empty) return false;
+    const double changed = node->stale ? supply.heights().highest : -INFINITY;
+    return camera.eye.z > std::max(node->facts.highest + node->facts.error, changed) + corner;
   }
 
   void submit(FrameStats& stats) {

@@ -33,7 +33,8 @@ std::size_t TileCache::room() const {
   return free_.size() + std::size_t(std::count_if(tiles_.begin(), tiles_.end(), idle));
 }
 
-std::uint32_t TileCache::take_slot() {
+std::uint32_t TileCache::take_slot(const TileKey& key) {
+  if (const Node* own = find(key); own && own->drawable()) return own->slot;
   if (free_.empty()) {
     std::uint32_t victim = kNoSlot;
     for (std::uint32_t s = 0; s < slots(); ++s) {
@@ -57,11 +58,11 @@ void TileCache::give_up(std::uint32_t slot) { tiles_[slot] = {}, free_.push_back
 
 void TileCache::put(const TileKey& key, const TileFacts& facts, std::uint32_t slot) {
   Node& n = nodes_[key];
-  if (n.slot != kNoSlot) give_up(n.slot);
+  if (n.slot != kNoSlot && n.slot != slot) give_up(n.slot);
   n.facts = facts, n.slot = slot, n.used = selection_;
   n.empty = slot == kNoSlot, n.stale = false;
   if (slot == kNoSlot) return;
-  assert(tiles_[slot].taken && !tiles_[slot].known);
+  assert(tiles_[slot].taken && (!tiles_[slot].known || tiles_[slot].tile == key));
   tiles_[slot] = {key, true, true};
 }
 

@@ -50,9 +50,11 @@ class TileCache {
   const Node* find(const TileKey& key) const;
   /// Keeps its slot until the next begin_selection(). REQUIRES: the node is there.
   void use(const TileKey& key, double pixels);
-  std::size_t room() const;  ///< how many slots take_slot() would give
-  /// A slot for a tile that is about to be made; kNoSlot where all of them are used.
-  std::uint32_t take_slot();
+  std::size_t room() const;  ///< how many slots take_slot() would give to tiles that have none
+  bool in_use(const Node& node) const { return node.used == selection_; }
+  /// Where a tile is about to be made: its own slot if it has one, which is overwritten; kNoSlot where all
+  /// are used.
+  std::uint32_t take_slot(const TileKey& key);
   /// The tile is made. REQUIRES: `slot` was taken, or is kNoSlot for a tile without data.
   void put(const TileKey& key, const TileFacts& facts, std::uint32_t slot);
   /// Tiles that a change of the database reaches will be made anew; until then they are drawn as they are.

@@ -1,6 +1,7 @@
 #include "render/tile_selection.h"
 
 #include <algorithm>
+#include <unordered_set>
 
 namespace patchwork {
 
@@ -15,6 +16,7 @@ class Selector {
       : lattice_(lattice), frustum_(frustum), options_(options), cache_(cache), out_(out) {
     out_.tiles.clear(), out_.leaves.clear(), out_.drawn.clear(), out_.wanted.clear(), out_.stale = false,
                                                                                       out_.pixels = 0;
+    cache_.begin_selection();
   }
 
   void run() {
@@ -54,8 +56,11 @@ class Selector {
     const auto place = std::uint32_t(out_.leaves.size());
     out_.leaves.push_back(leaf);
     out_.tiles[key] = place;
-    if (!node.empty) cache_.use(key, leaf.pixels);
-    if (node.stale && (leaf.drawn || may_be_seen(box.place))) stale_.push_back(place);
+    if (!node.empty) use(key, leaf.pixels);
+    if (node.stale && (leaf.drawn || may_be_seen(box.place))) {
+      stale_.push_back(place);
+      held_ += node.empty;  // it may need a slot now
+    }
     if (!leaf.drawn) return;
     ++drawn_;
     if (leaf.pixels <= options_.pixel_error || key.level == 0) return;
@@ -78,23 +83,40 @@ class Selector {
     return !out_.leaves[above->second].drawn || try_split(above->second, pixels);
   }
 
+  void use(const TileKey& key, double pixels) {
+    held_ += !cache_.in_use(*cache_.find(key));
+    cache_.use(key, pixels);
+  }
+
+  // Are there slots for the children that are not counted yet?
+  bool children_fit(const TileKey& key) const {
+    std::size_t more = 0;
+    for (int c = 0; c < 4; ++c) {
+      const TileCache::Node* n = cache_.find(key.child(c));
+      if (n && n->empty) continue;
+      more += n ? !cache_.in_use(*n) : !missing_.contains(key.child(c));
+    }
+    return held_ + more <= options_.slots;
+  }
+
   bool children_are_there(const TileKey& key, double pixels) {
     bool all = true;
     for (int c = 0; c < 4; ++c) {
       const TileKey child = key.child(c);
       const TileCache::Node* n = cache_.find(child);
       if (n && (n->empty || n->drawable())) {
-        if (!n->empty) cache_.use(child, 0);
+        if (!n->empty) use(child, 0);
         continue;
       }
-      want(child, pixels), all = false;
+      if (missing_.insert(child).second) ++held_, want(child, pixels);
+      all = false;
     }
     return all;
   }
 
   bool try_split(std::uint32_t place, double pixels) {
     const TileKey key = out_.leaves[place].key;
-    if (key.level == 0 || drawn_ + 3 > options_.most_tiles) return false;
+    if (key.level == 0 || drawn_ + 3 > options_.most_tiles || !children_fit(key)) return false;
     if (!children_are_there(key, pixels)) return false;
     for (int s = 0; s < 4; ++s)
       if (!make_room(key.beside(s), pixels)) return false;
@@ -128,8 +150,6 @@ class Selector {
     std::sort(out_.wanted.begin(), out_.wanted.end(), [](const auto& a, const auto& b) {
       return a.pixels != b.pixels ? a.pixels > b.pixels : a.key < b.key;
     });
-    const auto same = [](const auto& a, const auto& b) { return a.key == b.key; };
-    out_.wanted.erase(std::unique(out_.wanted.begin(), out_.wanted.end(), same), out_.wanted.end());
   }
 
   const TileLattice& lattice_;
@@ -139,7 +159,8 @@ class Selector {
   Selection& out_;
   std::vector<std::uint32_t> queue_;  // heap of places
   std::vector<std::uint32_t> stale_;  // places where something else may be in sight
-  std::size_t drawn_ = 0;
+  std::unordered_set<TileKey> missing_;
+  std::size_t drawn_ = 0, held_ = 0;  // held: slots, of what is used and for what is wanted
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Which tiles a frame draws: a restricted quadtree that keeps to the pixel error as far as tiles are there.
 #pragma once
 
+#include <cstdint>
 #include <unordered_map>
 #include <vector>
 
@@ -11,6 +12,8 @@ namespace patchwork {
 struct SelectionOptions {
   double pixel_error = 1;         ///< pixels
   std::size_t most_tiles = 4096;  ///< that are drawn; the largest errors are refined first
+  /// Of the cache, for all that is used or wanted: what matters less goes without.
+  std::size_t slots = SIZE_MAX;
   HeightRange heights = {};  ///< metres: between which terrain may be now where a tile shows an old state
 };
 
@@ -38,8 +41,8 @@ struct Selection {
   const Leaf* leaf_at(TileKey key, int towards_x, int towards_y) const;
 };
 
-/// Starts from the root, whose absence makes it the only one wanted. Marks what it uses in the cache.
-/// `selection` is overwritten; its memory is kept.
+/// Starts from the root, whose absence makes it the only one wanted. Begins a selection of the cache, and
+/// marks what it uses there. `selection` is overwritten; its memory is kept.
 void select_tiles(const TileLattice& lattice, const Frustum& frustum, const SelectionOptions& options,
                   TileCache& cache, Selection& selection);
 

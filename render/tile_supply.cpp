@@ -47,41 +47,45 @@ TileSupply::TileSupply(std::shared_ptr<Device> device, const Database& db, const
 
 void TileSupply::select(const Frustum& frustum, FrameStats& stats) {
   const Stopwatch watch;
-  cache_.begin_selection();  // what this selection does not use may give its slot to what it wants
-  select_tiles(lattice_, frustum, {options_.pixel_error, most_tiles_, heights_}, cache_, selection_);
+  select_tiles(lattice_, frustum, {options_.pixel_error, most_tiles_, cache_.slots(), heights_}, cache_,
+               selection_);
   wanted_.clear();
   for (const Selection::Wanted& w : selection_.wanted) wanted_.push_back(w.key);
   stats.select_ms += watch.milliseconds();
 }
 
-// The most wanted, in half of the slots that can be had (a tile's four children at least): what turns out to
-// be wanted more, once these are there, finds room too. Level by level, the coarsest first; false if nothing
-// could be made.
-bool TileSupply::make(const std::vector<TileKey>& wanted) {
-  const std::size_t most = std::max<std::size_t>(4, cache_.room() / 2);
-  std::vector<TileKey> tiles(wanted.begin(), wanted.begin() + std::ptrdiff_t(std::min(most, wanted.size())));
+// Half of the slots that can be had, four at least (a tile's children): what turns out to be wanted more once
+// these are there would take the rest away again.
+std::size_t TileSupply::most_at_a_time() const { return std::max<std::size_t>(4, cache_.room() / 2); }
+
+// Of the most wanted, level by level, the coarsest first. Returns how many.
+std::size_t TileSupply::make(const std::vector<TileKey>& wanted) {
+  const std::size_t most = std::min(wanted.size(), most_at_a_time());
+  std::vector<TileKey> tiles(wanted.begin(), wanted.begin() + std::ptrdiff_t(most));
   std::stable_sort(tiles.begin(), tiles.end(),
                    [](const TileKey& a, const TileKey& b) { return a.level > b.level; });
   std::size_t made = 0;
   for (auto from = tiles.begin(); from != tiles.end();) {
     const auto to = std::find_if(from, tiles.end(), [&](const TileKey& k) { return k.level != from->level; });
-    for (const TileMaker::Made& m : maker_.make({from, to}, [&] { return cache_.take_slot(); }))
+    for (const TileMaker::Made& m :
+         maker_.make({from, to}, [&](const TileKey& k) { return cache_.take_slot(k); }))
       cache_.put(m.key, m.facts, m.slot), ++made;
     from = to;
   }
-  return made > 0;
+  return made;
 }
 
 // As many as the time allows, one at least; the root is awaited where nothing could be drawn without it.
 // False if nothing could be made.
 bool TileSupply::make_fetched() {
-  if (!cache_.find(lattice_.root())) return make({lattice_.root()});
+  if (!cache_.find(lattice_.root())) return make({lattice_.root()}) > 0;
   const auto most = std::size_t(std::max(1.0, options_.make_ms / ms_a_tile_));
-  const std::vector<TileKey> fetched = fetcher_->take(wanted_, most);
+  const std::vector<TileKey> fetched = fetcher_->take(wanted_, std::min(most, most_at_a_time()));
   if (fetched.empty()) return false;
   const Stopwatch watch;
-  if (!make(fetched)) return false;
-  ms_a_tile_ += 0.2 * (watch.milliseconds() / double(fetched.size()) - ms_a_tile_);
+  const std::size_t made = make(fetched);
+  if (made == 0) return false;
+  ms_a_tile_ += 0.2 * (watch.milliseconds() / double(made) - ms_a_tile_);
   return true;
 }
 
@@ -89,15 +93,13 @@ const Selection& TileSupply::update(const Frustum& frustum, FrameStats& stats) {
   const TileMakerCounts before = maker_.counts();
   select(frustum, stats);
   if (fetcher_) {
-    // Without a slot to be had, what would be fetched could not be made.
-    if (cache_.room() == 0) wanted_.clear();
     fetcher_->want(wanted_);
     if (make_fetched() || selection_.drawn.empty()) select(frustum, stats);
   } else {
-    while (!wanted_.empty() && make(wanted_)) select(frustum, stats);
+    while (!wanted_.empty() && make(wanted_) > 0) select(frustum, stats);
   }
   note_made(before, maker_.counts(), stats);
-  stats.tiles_wanted = cache_.room() > 0 ? selection_.wanted.size() : 0;
+  stats.tiles_wanted = selection_.wanted.size();
   // Blocks of better tiles are simplified until they too just keep to what was asked.
   if (!selection_.drawn.empty()) stats.pixels_reached = std::max(selection_.pixels, options_.pixel_error);
   for (const std::uint32_t k : selection_.drawn) {

@@ -22,6 +22,7 @@ class TileSupply {
   void set_pixel_error(double pixels) { options_.pixel_error = pixels; }
   const TileCache& cache() const { return cache_; }
   const Selection& selection() const { return selection_; }  ///< of the last update
+  const HeightRange& heights() const { return heights_; }    ///< metres: of all surfaces
   std::uint32_t most_tiles() const { return most_tiles_; }
 
   /// True if no worker reads any more: the database may move on until release(). Else ask again a frame
@@ -33,13 +34,14 @@ class TileSupply {
 
  private:
   void select(const Frustum& frustum, FrameStats& stats);
-  bool make(const std::vector<TileKey>& wanted);
+  std::size_t make(const std::vector<TileKey>& wanted);
+  std::size_t most_at_a_time() const;
   bool make_fetched();
 
   const Database& db_;
   const TileLattice& lattice_;
   RendererOptions options_;
-  HeightRange heights_;  // of all surfaces
+  HeightRange heights_;
   TileCache cache_;
   TileMaker maker_;
   std::unique_ptr<TileFetcher> fetcher_;  // only in the background

@@ -249,7 +249,7 @@ std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tile
       made.push_back({tiles[k], {}, TileCache::kNoSlot});
       continue;
     }
-    const std::uint32_t slot = take_slot();
+    const std::uint32_t slot = take_slot(tiles[k]);
     if (slot == TileCache::kNoSlot) break;
     filled.push_back(tiles[k]), to.push_back(slot), facts.push_back(f);
   }

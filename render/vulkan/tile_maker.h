@@ -30,7 +30,7 @@ class TileMaker {
     TileFacts facts;
     std::uint32_t slot;  ///< TileCache::kNoSlot: nothing answers there
   };
-  using TakeSlot = std::function<std::uint32_t()>;
+  using TakeSlot = std::function<std::uint32_t(const TileKey&)>;
 
   /// `base`: metres, what the heights in the slots are relative to. `memory`: bytes for patches on the card.
   /// `published`: blocks are measured as published too.

@@ -128,6 +128,31 @@ TEST_F(InsertionTest, OneThatRisesIntoSightIsSeen) {
   EXPECT_NEAR(double(covered(r)), double(covered(fresh)), 0.02 * double(covered(fresh)));
 }
 
+// A tile that changed is made anew in the slot that it has.
+TEST_F(InsertionTest, WithAFullPoolWhatChangedIsMadeAnew) {
+  for (const bool realtime : {false, true}) {
+    Database db = reader();
+    RendererOptions options{
+        .width = kWidth, .height = kHeight, .pixel_error = 0.1, .memory = std::size_t{40} << 20};
+    options.realtime = realtime;
+    Renderer r(test_device(), db, options);
+    const Camera camera{{800, 300, 900}, {800, 800, 300}, 60, kWidth, kHeight};
+    const auto settle = [&] {
+      FrameStats last = r.draw(camera);
+      for (int n = 0; realtime && n < 5000 && last.tiles_wanted > 0; ++n) last = r.draw(camera);
+      return last;
+    };
+    EXPECT_GT(settle().pixels_reached, 0.1) << "the pool is too small";
+    insert(2);
+    for (int n = 0; n < 5000 && !r.refresh(db); ++n) r.draw(camera);
+    const FrameStats after = settle();
+    EXPECT_EQ(after.tiles_wanted, 0u);
+    EXPECT_EQ(after.tiles_stale, 0u);
+    EXPECT_EQ(r.cache().find_violation(), "");
+    remove(2);
+  }
+}
+
 // Triangles that look away may show through the gaps that coarse and old tiles leave.
 TEST_F(InsertionTest, WhatLooksAwayIsDrawnWhileTilesAreCoarseOrStale) {
   Database db = reader();

@@ -193,6 +193,38 @@ TEST_F(TerrainTest, AskingForMoreThanThePoolHoldsReachesNoLess) {
   for (std::size_t k = 1; k < reached.size(); ++k) EXPECT_LE(reached[k], reached[k - 1]);
 }
 
+// Whatever it drew before, and whether it waits or not.
+TEST_F(TerrainTest, AFullPoolGoesToWhatMattersNow) {
+  RendererOptions options{
+      .width = kWidth, .height = kHeight, .pixel_error = 0.1, .memory = std::size_t{40} << 20};
+  const Camera before{{300, 200, 700}, {900, 900, 300}, 60, kWidth, kHeight};
+  const Camera after{{500, 450, 600}, {1000, 1200, 300}, 60, kWidth, kHeight};
+  const auto sorted = [](std::vector<TileKey> tiles) {
+    std::sort(tiles.begin(), tiles.end());
+    return tiles;
+  };
+  for (const TilePolicy policy : {TilePolicy::first, TilePolicy::lru, TilePolicy::lru_error}) {
+    options.policy = policy;
+    Renderer fresh(test_device(), db(), options), moved(test_device(), db(), options);
+    const FrameStats at_once = fresh.draw(after);
+    EXPECT_GT(at_once.pixels_reached, 0.1) << "the pool is too small";
+    moved.draw(before);
+    const FrameStats later = moved.draw(after);
+    EXPECT_GT(later.tiles_made, 0u);
+    EXPECT_EQ(later.pixels_reached, at_once.pixels_reached);
+    EXPECT_EQ(sorted(moved.tiles()), sorted(fresh.tiles()));
+    RendererOptions live = options;
+    live.realtime = true, live.make_ms = 1;
+    Renderer flies(test_device(), db(), live);
+    FrameStats s;
+    for (const Camera& camera : {before, after})
+      for (int n = 0; n < 5000; ++n)
+        if (s = flies.draw(camera); s.tiles_wanted == 0) break;
+    EXPECT_EQ(s.tiles_wanted, 0u);
+    EXPECT_EQ(sorted(flies.tiles()), sorted(fresh.tiles()));
+  }
+}
+
 // An eye inside the boxes of tiles, a hand above the ground, looking down, and looking away from everything.
 TEST_F(TerrainTest, NearPlane) {
   Renderer r = renderer(1);

@@ -93,7 +93,7 @@ TEST(TileCache, GivesNoSlotOfThisFrameAwayAndKnowsWhoHasWhich) {
         cache.use(key, double(random() % 10));
         used.insert(key);
       } else {
-        const std::uint32_t slot = cache.take_slot();
+        const std::uint32_t slot = cache.take_slot(key);
         if (slot == TileCache::kNoSlot) {
           EXPECT_EQ(used.size(), 8u) << "all of them are used in this frame";
           continue;
@@ -111,12 +111,12 @@ TEST(TileCache, GivesNoSlotOfThisFrameAwayAndKnowsWhoHasWhich) {
 TEST(TileCache, TheLeastRecentlyUsedGoesFirst) {
   TileCache cache(2, TilePolicy::lru);
   const TileKey a{0, 0, 0}, b{0, 1, 0}, c{0, 2, 0};
-  cache.put(a, {}, cache.take_slot());
-  cache.put(b, {}, cache.take_slot());
+  cache.put(a, {}, cache.take_slot(a));
+  cache.put(b, {}, cache.take_slot(b));
   cache.begin_selection();
   cache.use(a, 1);
   cache.begin_selection();
-  cache.put(c, {}, cache.take_slot());
+  cache.put(c, {}, cache.take_slot(c));
   EXPECT_TRUE(cache.find(a)->drawable());
   EXPECT_EQ(cache.find(b), nullptr);
 }
@@ -147,7 +147,7 @@ class Woods {
     }
     TileFacts f{.lowest = 200, .highest = 400, .holes = (key.x + 3 * key.y + key.level) % 11 == 0};
     f.error = lattice_.step(key.level) * 0.1 * (0.2 + double(random_() % 100) / 50);
-    cache.put(key, f, cache.take_slot());
+    cache.put(key, f, cache.take_slot(key));
     if (key.level > lattice_.levels() - 7 && chance(share))
       for (int c = 0; c < 4; ++c) grow(key.child(c), 0.9);
   }
@@ -254,6 +254,30 @@ TEST(TileSelection, NeverDrawsMoreThanItMay) {
       select_tiles(woods.lattice(), frustum, {.pixel_error = 1e-6, .most_tiles = most}, woods.cache, s);
       ASSERT_LE(s.drawn.size(), most);
       full += s.drawn.size() + 3 > most;
+    }
+  }
+  EXPECT_GT(full, 300u) << "and takes what it may";
+}
+
+// What is used and what is wanted fit into the cache together, and what is left out is not the worst.
+TEST(TileSelection, WantsNoMoreThanThereAreSlotsFor) {
+  const std::uint64_t seed = test_seed(27);
+  std::size_t full = 0;
+  for (std::uint64_t n = 0; n < 60; ++n) {
+    Woods woods(seed + n);
+    const Frustum frustum(woods.camera());
+    Selection all;
+    select_tiles(woods.lattice(), frustum, {.pixel_error = 1e-6}, woods.cache, all);
+    for (std::size_t slots = 4; slots < 120; slots += 7) {
+      Selection s;
+      select_tiles(woods.lattice(), frustum, {.pixel_error = 1e-6, .slots = slots}, woods.cache, s);
+      std::set<TileKey> wanted;
+      for (const Selection::Wanted& w : s.wanted) EXPECT_TRUE(wanted.insert(w.key).second) << "once";
+      std::size_t held = wanted.size();
+      for (const auto& [key, place] : s.tiles) held += woods.cache.find(key)->drawable();
+      ASSERT_LE(held, slots);
+      full += held + 4 > slots;
+      EXPECT_GE(s.pixels, all.pixels);
     }
   }
   EXPECT_GT(full, 300u) << "and takes what it may";

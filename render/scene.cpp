@@ -129,12 +129,14 @@ Scene parse_scene(const std::string& json, const std::string& where) {
   return scene;
 }
 
-Scene read_scene(const std::string& path) {
+std::string scene_text(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
   if (!file || !(text << file.rdbuf())) throw Error(path, "it cannot be read");
-  return parse_scene(text.str(), path);
+  return text.str();
 }
+
+Scene read_scene(const std::string& path) { return parse_scene(scene_text(path), path); }
 
 std::string scene_schema() {
   Json s{{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "A scene of patchwork"}};

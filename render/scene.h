@@ -81,7 +81,9 @@ std::string default_scene_text();  ///< the same as JSON
 /// member that is unknown, missing, of the wrong type or out of its range, effects that need or exclude each
 /// other.
 Scene parse_scene(const std::string& json, const std::string& where);
-/// The same from a file; throws Error also if it cannot be read.
+/// What a file holds. Throws Error: it cannot be read.
+std::string scene_text(const std::string& path);
+/// Both in one.
 Scene read_scene(const std::string& path);
 
 /// The JSON schema (draft 2020-12) of what parse_scene takes; render/scene.schema.json is this text.

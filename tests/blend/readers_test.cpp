@@ -87,6 +87,36 @@ TEST_F(ReadersBesideAWriter, AWriterDisturbsNoReader) {
   EXPECT_GT(moved, 0) << "negative control: the state did change meanwhile";
 }
 
+TEST_F(ReadersBesideAWriter, ACheckFindsNothingWhileOthersReadAndWrite) {
+  const Database shared = Database::open(path(), kLittle);
+  std::atomic<bool> writing{true};
+  std::atomic<int> wrong{0}, checks{0}, moved{0};
+  std::thread writer([&] {
+    Database db = Database::open_existing(path(), kLittle);
+    for (int n = 0; n < kMostRounds && (n < kRounds || moved < 2 || checks < 4); ++n)
+      db.import(guest_[0], {.name = "guest"}), db.remove("guest");
+    writing = false;
+  });
+  const auto check = [&](const Database& db) {
+    for (const Problem& p : db.check()) ADD_FAILURE() << p.what << " at " << p.where;
+    ++checks;
+  };
+  std::thread checker([&] {
+    while (writing) check(shared);
+  });
+  std::thread reader([&] {
+    while (writing) wrong += !answers_as(shared, expected_);
+  });
+  std::thread mover([&] {
+    Database own = Database::open(path(), kLittle);
+    while (writing) moved += own.refresh(), check(own);
+  });
+  for (std::thread* t : {&writer, &checker, &reader, &mover}) t->join();
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GT(checks, 3);
+  EXPECT_GT(moved, 0) << "negative control: the state did change meanwhile";
+}
+
 #ifdef __SANITIZE_THREAD__
 // Without this a preset that forgot its flags would pass too.
 TEST(ThreadSanitizer, SeesARace) {

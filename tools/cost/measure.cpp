@@ -1,7 +1,6 @@
 // The knobs of `patchwork cost`, one at a time.
 #include <fmt/format.h>
 #include <malloc.h>
-#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 
 #include <algorithm>
@@ -9,18 +8,15 @@
 #include <limits>
 #include <map>
 #include <set>
-#include <tuple>
 #include <utility>
 
-#include "blend/vulkan/vulkan_blend.h"
 #include "db/error.h"
 #include "db/stopwatch.h"
 #include "tools/bench/bench.h"
-#include "tools/cost/check_points.h"
 #include "tools/cost/frames.h"
 #include "tools/cost/reference.h"
+#include "tools/cost/setting.h"
 #include "tools/cost/uniform_grid.h"
-#include "tools/resampler.h"
 #include "tools/sample_dataset.h"
 
 namespace patchwork::cli {
@@ -46,29 +42,6 @@ void keep_freed_memory() {
   mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
 }
 
-// One setting of one knob, ready to be measured.
-struct Setting {
-  std::string knob, value, unit = "m";
-  double asked = 0;
-  std::shared_ptr<const CutSurface> cut;
-  Extent window{};
-  std::span<const double> scale{};  // see CheckPoints::compare
-  const Database* db = nullptr;
-  const CheckPoints* points = nullptr;
-  BlendOptions blend{};
-  bool vulkan = false, comparable = true;
-  int tile = 64, side = 0, threads = 0;
-
-  bool same_work(const Setting& o) const {
-    const auto all = [](const Setting& s) {
-      return std::tuple(s.unit, s.asked, s.window.xmin, s.window.ymin, s.window.xmax, s.window.ymax, s.db,
-                        s.blend.smoothness, s.blend.composition, s.vulkan, s.vulkan ? s.tile : 0, s.side,
-                        s.threads);
-    };
-    return all(*this) == all(o);
-  }
-};
-
 class Bench {
  public:
   Bench(const CostOptions& o, const Common& common)
@@ -81,6 +54,7 @@ class Bench {
     points_ = std::make_unique<CheckPoints>(db_, extent_, o.points);
     grid_ = std::make_unique<UniformGrid>(db_, extent_, *points_, folder_.path("uniform.tif"), common.memory);
     open_device();
+    surfaces_ = std::make_unique<Surfaces>(device_, common.memory, memory_);
     make_ladder();
   }
 
@@ -199,54 +173,15 @@ class Bench {
     return setting(knob, value, ladder_[kMiddle]);
   }
 
-  RasterFrame frame(const Setting& s) const {
-    const double dx = (s.window.xmax - s.window.xmin) / s.side, dy = (s.window.ymax - s.window.ymin) / s.side;
-    return {s.window.xmin + dx / 2, dx, 0, s.window.ymax - dy / 2, 0, -dy};
-  }
-
-  std::unique_ptr<Evaluator> evaluator(const Setting& s, const Database& db, const Extraction& x) const {
-    if (!s.vulkan) return std::make_unique<Blend>(db, x.patches, s.blend);
-    return std::make_unique<VulkanBlend>(
-        device_, db, x.patches, s.blend,
-        VulkanOptions{.memory = std::max<std::uint64_t>(common_.memory / 4, x.patches.size() * 16384),
-                      .tile = s.tile});
-  }
-
-  CostRow facts(const Setting& s) const {
-    const Extraction x = extract(*s.db, *s.cut);
-    CostRow row{.knob = s.knob, .value = s.value, .unit = s.unit, .asked = s.asked};
-    row.patches = x.patches.size(), row.bytes = x.cost.bytes, row.file_bytes = s.db->file_bytes();
-    row.samples = double(s.side) * s.side;
-    if (s.comparable) row.found = x.cost, row.expected = expect(*s.db, *s.cut, {});
-    s.points->compare(*evaluator(s, *s.db, x), s.scale, s.vulkan, row);
-    return row;
-  }
-
-  void once(const Setting& s, Stages& ms) const {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(s.threads));
-    const Extraction x = extract(*s.db, *s.cut);
-    const Database fresh = Database::open(s.db->path(), memory_);  // nothing of it is in memory yet
-    const Stopwatch fetching;
-    prefetch(fresh, x.patches, memory_);
-    std::unique_ptr<Evaluator> surface;
-    if (s.vulkan) surface = evaluator(s, fresh, x);  // what is sent to the card
-    const double fetch = fetching.milliseconds();
-    const Stopwatch blending;
-    if (!surface) surface = evaluator(s, fresh, x);
-    std::vector<float> heights(std::size_t(s.side) * std::size_t(s.side));
-    surface->at_pixels(frame(s), s.side, 0, s.side,
-                       {.height = {}, .bound = {}, .source = {}, .patch = {}, .height32 = heights});
-    ms.query.push_back(1e3 * x.cost.seconds), ms.fetch.push_back(fetch);
-    ms.blend.push_back(blending.milliseconds());
-  }
-
   void add(const std::vector<Setting>& settings) {
     for (const Setting& s : settings) {
       const auto same =
           std::find_if(done_.begin(), done_.end(), [&](const auto& o) { return o.first.same_work(s); });
-      all_.push_back(same != done_.end() ? all_[same->second]
-                                         : Measurable{facts(s), std::make_shared<const MeasuredRun>(
-                                                                    [this, s](Stages& ms) { once(s, ms); })});
+      all_.push_back(
+          same != done_.end()
+              ? all_[same->second]
+              : Measurable{surfaces_->facts(s), std::make_shared<const MeasuredRun>(
+                                                    [this, s](Stages& ms) { surfaces_->once(s, ms); })});
       all_.back().row.knob = s.knob, all_.back().row.value = s.value;
       if (same == done_.end()) done_.emplace_back(s, all_.size() - 1);
       bar_.show(std::min(kGathering, kGathering * double(all_.size()) / kAboutSettings));
@@ -442,6 +377,7 @@ class Bench {
   std::unique_ptr<CheckPoints> points_;
   std::unique_ptr<UniformGrid> grid_;
   std::shared_ptr<Device> device_;
+  std::unique_ptr<Surfaces> surfaces_;
   std::vector<double> ladder_, scale_;
   std::vector<Database> stored_;  // again, to within the tolerances
   std::optional<Database> reference_;

@@ -1,7 +1,4 @@
 // patchwork view: a window to fly in.
-#include <fstream>
-#include <sstream>
-
 #include "db/error.h"
 #include "tools/cli.h"
 #include "tools/output_file.h"
@@ -19,17 +16,10 @@ struct Options {
   bool validation = false;
 };
 
-std::string text_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) throw Error(path, "it cannot be read");
-  return text.str();
-}
-
 void run(const Options& o, const Common& common) {
   Database db = open_filled(o.database, common);
   refuse_overwriting(o.database, {o.screenshot});
-  const std::string text = o.scene.empty() ? default_scene_text() : text_of(o.scene);
+  const std::string text = o.scene.empty() ? default_scene_text() : scene_text(o.scene);
   Scene scene = parse_scene(text, o.scene);
   if (!o.size.empty()) scene.width = o.size[0], scene.height = o.size[1];
   if (o.pixel_error > 0) scene.pixel_error = o.pixel_error;

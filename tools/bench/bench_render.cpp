@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "render/camera_path.h"
 #include "tools/bench/bench.h"
@@ -56,26 +57,33 @@ double quantile(std::vector<double> v, double q) {
 
 Json json_of(const ErrorFigures& f) { return {{"max", f.max}, {"p99", f.p99}, {"rms", f.rms}}; }
 
-// The same flight at several pixel errors, compared where the largest errors measured are the same: chunks
-// that are as coarse as they may be to have no larger one than ours, and ours where it has no larger one than
-// the mesh.
-std::vector<Work> at_equal_errors(const std::vector<Flown>& flights) {
+// The same flight as chunks, whose tiles keep to a pixel error.
+struct ChunkFlight {
+  double pixels;
+  Spread ms;
+  ErrorFigures error;
+};
+
+// Compared where no peer has a larger measured error: the fastest chunks that have none larger than ours, and
+// ours where it is the coarsest that has none larger than the mesh.
+std::vector<Work> at_equal_errors(const std::vector<Flown>& flights,
+                                  const std::vector<ChunkFlight>& chunked) {
   std::vector<Work> all;
   const Flown* as_mesh = nullptr;
   for (const Flown& f : flights) {
-    const Flown* chunks = nullptr;
-    for (const Flown& g : flights)
-      if (g.chunked.max <= f.ours.max && (!chunks || g.chunked.max > chunks->chunked.max)) chunks = &g;
+    const ChunkFlight* best = nullptr;
+    for (const ChunkFlight& c : chunked)
+      if (c.error.max <= f.ours.max && (!best || c.ms.median < best->ms.median)) best = &c;
     if (f.ours.max <= f.mesh.max && (!as_mesh || f.ours.max > as_mesh->ours.max)) as_mesh = &f;
-    if (!chunks) continue;
+    if (!best) continue;
     const Json answer{
-        {"pixel_error_measured", {{"ours", json_of(f.ours)}, {"chunked", json_of(chunks->chunked)}}},
-        {"chunks_of", chunks->name}};
+        {"pixel_error_measured", {{"ours", json_of(f.ours)}, {"chunked", json_of(best->error)}}},
+        {"chunks_at_pixel_error", best->pixels}};
     all.push_back({"draw " + f.name + ", chunks of no larger error",
                    "ms",
                    true,
                    f.draw.ours,
-                   {{"chunked", chunks->chunked_ms}},
+                   {{"chunked", best->ms}},
                    answer});
   }
   if (!as_mesh) return all;
@@ -127,28 +135,40 @@ class Flights {
       t.other_frame.push_back(a.total_ms), t.other.push_back(a.factors_ms + a.draw_ms);
       const FrameStats p = published.draw(camera);
       t.published.push_back(p.factors_ms + p.draw_ms);
-      const bool measured = k % std::max(1, frames_ / kMeasured) == 0;
-      const auto measure = [&](std::vector<double>& all, const std::vector<float>& depth) {
-        const std::vector<double> off = screen_distances(best_, camera, depth, kEvery);
-        all.insert(all.end(), off.begin(), off.end());
-      };
       t.chunked.push_back(peers.chunked(ours));
-      if (measured) {
-        measure(t.chunked_off, peers.depth(camera));
-        measure(t.ours_off, ours.depth()), measure(t.published_off, published.depth());
-      }
       t.screen.push_back(peers.full_screen(ours));
       t.bare.push_back(t.screen.back() + peers.plain(ours, s.triangles));
       t.covered.push_back(t.screen.back() + peers.covering(s.triangles));
-      if (!mesh_) continue;
-      t.mesh.push_back(peers.full_mesh(camera));
-      if (measured) measure(t.mesh_off, peers.depth(camera));
+      if (mesh_) t.mesh.push_back(peers.full_mesh(camera));
+      if (!is_measured(k)) continue;
+      measure(camera, ours.depth(), t.ours_off), measure(camera, published.depth(), t.published_off);
+      peers.chunked(ours), measure(camera, peers.depth(camera), t.chunked_off);
+      if (mesh_) peers.full_mesh(camera), measure(camera, peers.depth(camera), t.mesh_off);
     }
     return flown(t, fmt::format("{} x {} at {:g} px", width, height, pixel_error),
                  mesh ? "hardware tessellation" : "mesh by compute");
   }
 
+  ChunkFlight fly_chunks(int width, int height, double pixel_error) {
+    Renderer tiles(device_, db_, {.width = width, .height = height, .pixel_error = pixel_error});
+    RenderPeers peers(device_, db_, nullptr, width, height);
+    const CameraPath path(flight_over(db_, frames_));
+    std::vector<double> ms, off;
+    for (int k = 0; k < path.frames(); ++k) {
+      const Camera camera = path.frame(k, width, height);
+      tiles.draw(camera);
+      ms.push_back(peers.chunked(tiles));
+      if (is_measured(k)) measure(camera, peers.depth(camera), off);
+    }
+    return {pixel_error, spread(ms), figures_of(off)};
+  }
+
  private:
+  bool is_measured(int frame) const { return frame % std::max(1, frames_ / kMeasured) == 0; }
+  void measure(const Camera& camera, const std::vector<float>& depth, std::vector<double>& all) const {
+    const std::vector<double> off = screen_distances(best_, camera, depth, kEvery);
+    all.insert(all.end(), off.begin(), off.end());
+  }
   // The first frame makes all tiles, and is not one of the flight.
   static Spread spread(const std::vector<double>& v) { return Spread::of({v.begin() + 1, v.end()}); }
 
@@ -212,7 +232,9 @@ std::vector<Work> bench_render(const BenchOptions& o) {
     std::vector<Flown> flown;
     for (const double pixels : {1.0, 2.0, 4.0, 8.0}) flown.push_back(flights.fly(width, height, pixels));
     for (const Flown& f : flown) all.push_back(f.draw), all.push_back(f.frame);
-    for (Work& w : at_equal_errors(flown)) all.push_back(std::move(w));
+    std::vector<ChunkFlight> chunked;
+    for (int k = 0; k <= 10; ++k) chunked.push_back(flights.fly_chunks(width, height, std::exp2(0.5 * k)));
+    for (Work& w : at_equal_errors(flown, chunked)) all.push_back(std::move(w));
   }
   return all;
 }

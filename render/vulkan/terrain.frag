@@ -10,29 +10,26 @@ layout(binding = 4) uniform sampler2DArray slopes;  // dh/dx, dh/dy at half cell
 
 layout(constant_id = 0) const bool kHoles = false;
 
-// Linear between half cells.
-vec3 of_slot(vec2 at) { return vec3((at * 128.0 + 0.5) / 129.0, round(local.w)); }
-
 Ground ground_here() {
   Ground g;
   const vec3 place = place_at(gl_FragCoord);
   g.from_eye = place;
   g.z = place.z + look.air_scale.y + frame.detail.y * dot(place.xy, place.xy);
-  g.normal = normalize(vec3(-texture(slopes, of_slot(local.xy)).xy, 1));
+  g.normal = normalize(vec3(-texture(slopes, local.xyw).xy, 1));
   g.change = has_contours ? height_change(place, g.normal) : 0.0;
   const vec2 at = look.light_map.xy + place.xy * look.light_map.z;
   g.horizon = has_shadow ? texture(sun_map, (at + 0.5) / vec2(textureSize(sun_map, 0))).x : 0.0;
   g.open = has_sky ? texture(sky_map, (0.25 * at + 0.5) / vec2(textureSize(sky_map, 0))).x : 1.0;
-  g.value = has_cost ? facts_at(int(local.z + 0.5)).z : has_scale ? texture(knowledge, of_slot(local.xy)).x : 0.0;
+  g.value = has_cost ? facts_at(int(local.z + 0.5)).z : has_scale ? texture(knowledge, local.xyw).x : 0.0;
   g.source = vec3(0);
-  if (has_source) g.source = class_color(int(texelFetch(knowledge, ivec3(local.xy * 128.0 + 0.5, int(local.w + 0.5)), 0).y));
+  if (has_source) g.source = class_color(int(texelFetch(knowledge, ivec3(local.xy * vec2(textureSize(knowledge, 0)), int(local.w + 0.5)), 0).y));
   return g;
 }
 
 void main() {
   if (kHoles && local.z < -0.5) discard;
   if (is_plain) {
-    const vec3 n = normalize(vec3(-texture(slopes, of_slot(local.xy)).xy, 1));
+    const vec3 n = normalize(vec3(-texture(slopes, local.xyw).xy, 1));
     color = vec4(vec3(0.78, 0.76, 0.7) * (0.25 + 0.75 * max(dot(n, normalize(vec3(-0.5, 0.5, 0.7))), 0.0)), 1);
     return;
   }

@@ -60,7 +60,7 @@ vec3 position_of(Draw draw, ivec2 at, float height) {
 // For the last stage before triangles are set up: clip coordinates, and what the fragments are told.
 struct Vertex {
   vec4 place;
-  vec4 local;  // xy: in the tile, 0 to 1; z: the draw, kNoData without data; w: the slot
+  vec4 local;  // xyw: in images of half cells, w the slot; z: the draw, kNoData without data
 };
 // At half cells `at` of a draw: its height comes from the tile that owns it.
 Vertex vertex_at(int d, ivec2 at) {
@@ -68,7 +68,7 @@ Vertex vertex_at(int d, ivec2 at) {
   const float height = texelFetch(heights, texel_of(d, draw.slot, at)).x;
   const bool valid = !isnan(height);
   return Vertex(frame.clip * vec4(position_of(draw, at, valid ? height : 0), 1),
-                vec4(vec2(at) / float(2 * kCells), valid ? float(d) : kNoData, float(draw.slot)));
+                vec4((vec2(at) + 0.5) / float(2 * kCells + 1), valid ? float(d) : kNoData, float(draw.slot)));
 }
 
 // In a fragment shader: metres from the eye. Cheaper than a varying: lavapipe sets each up for each triangle.

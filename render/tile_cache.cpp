@@ -29,7 +29,7 @@ bool TileCache::better_victim(const Node& a, const Node& b) const {
 }
 
 std::size_t TileCache::room() const {
-  const auto idle = [&](const Slot& s) { return s.known && nodes_.at(s.tile).used != selection_; };
+  const auto idle = [&](const Slot& s) { return s.known && !in_use(nodes_.at(s.tile)); };
   return free_.size() + std::size_t(std::count_if(tiles_.begin(), tiles_.end(), idle));
 }
 
@@ -40,7 +40,7 @@ std::uint32_t TileCache::take_slot(const TileKey& key) {
     for (std::uint32_t s = 0; s < slots(); ++s) {
       if (!tiles_[s].known) continue;
       const Node& n = nodes_.at(tiles_[s].tile);
-      if (n.used == selection_) continue;
+      if (in_use(n)) continue;
       if (victim == kNoSlot || better_victim(n, nodes_.at(tiles_[victim].tile))) victim = s;
       if (policy_ == TilePolicy::first) break;
     }

@@ -14,8 +14,7 @@ class Selector {
   Selector(const TileLattice& lattice, const Frustum& frustum, const SelectionOptions& options,
            TileCache& cache, Selection& out)
       : lattice_(lattice), frustum_(frustum), options_(options), cache_(cache), out_(out) {
-    out_.tiles.clear(), out_.leaves.clear(), out_.drawn.clear(), out_.wanted.clear(), out_.stale = false,
-                                                                                      out_.pixels = 0;
+    out_.clear();
     cache_.begin_selection();
   }
 
@@ -164,6 +163,11 @@ class Selector {
 };
 
 }  // namespace
+
+void Selection::clear() {
+  tiles.clear(), leaves.clear(), drawn.clear(), wanted.clear();
+  stale = false, pixels = 0;
+}
 
 // Down to the corner that lies towards (x, y) (0: smaller, 1: larger) where the tile is split, up where a
 // larger one holds it.

@@ -37,6 +37,8 @@ struct Selection {
   double pixels = 0;   ///< error reached: the largest of all that is drawn and could be finer
   static constexpr std::uint32_t kSplit = UINT32_MAX;
 
+  void clear();  ///< memory is kept
+
   /// The place of the leaf that holds tile `key` of any level on the side of (x, y) nearest to it, see .cpp.
   const Leaf* leaf_at(TileKey key, int towards_x, int towards_y) const;
 };

@@ -167,7 +167,7 @@ struct RenderPeers::Impl {
     chunk_index_count = std::uint32_t(all.size());
     chunk_indices = vk::Buffer(card, all.size() * 4, VK_BUFFER_USAGE_INDEX_BUFFER_BIT, vk::Where::upload);
     std::memcpy(chunk_indices.mapped(), all.data(), all.size() * 4);
-    mesh_bindings.bind(plain_set, 0, plain_block), mesh_bindings.bind(plain_set, 1, draw_texels);
+    mesh_bindings.bind(plain_set, 0, plain_block);
     if (!grid) return;
     mesh = std::make_unique<Mesh>(card, db, *grid);
     mesh_bindings.bind(mesh_set, 0, mesh->block), mesh_bindings.bind(mesh_set, 1, mesh->texels);

@@ -1,6 +1,7 @@
 // Which tiles are on the card, in which slot, and what is known of each.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <unordered_map>
 #include <vector>
@@ -12,14 +13,22 @@ namespace patchwork {
 
 /// What a tile's making told, metres.
 struct TileFacts {
-  double lowest = 0, highest = 0;  ///< of every sample
+  static constexpr int kParts = 4;  ///< along each side
   /// Largest vertical distance of its own mesh from the best surface there is, or from the terrain where that
-  /// surface has a better bound: what refining it can take away.
+  /// surface has a better bound: what refining it can take away. Of all of the tile, and of its parts.
   double error = 0;
-  double reducible = 0;     ///< the share of `error` that comes of its patches, not of its mesh
-  double bound = 0;         ///< the largest guaranteed error of its heights
-  bool holes = false;       ///< some vertex has no data
-  std::size_t patches = 0;  ///< that it was made of
+  double lowest = 0, highest = 0;  ///< of every sample
+  struct Part {
+    double error = 0;
+    HeightRange heights;  ///< none: nothing answers there
+  };
+  std::array<Part, kParts * kParts> parts;  ///< row-major, from the smallest x and y
+  double bound = 0;                         ///< the largest guaranteed error of its heights
+  bool holes = false;                       ///< some vertex has no data
+  std::size_t patches = 0;                  ///< that it was made of
+
+  Part& part(int x, int y) { return parts[std::size_t(y * kParts + x)]; }
+  const Part& part(int x, int y) const { return parts[std::size_t(y * kParts + x)]; }
 };
 
 /// How a slot is found for a new tile when none is free.

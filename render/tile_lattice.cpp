@@ -73,13 +73,14 @@ TileLattice TileLattice::over(const Database& db) {
   while (std::ldexp(kCells * step, kMaxLevels - 1 - kLarger) < side + step) step *= 2;
   int levels = 1;
   while (std::ldexp(kCells * step, levels - 1 - kLarger) < side + step) ++levels;
-  // A vertex of the finest grid: all data lie in the middle of the root.
+  // All data lie in the middle half of the root, and where they begin is a corner of tiles: where an upright
+  // grid is all there is, no tile has its outline there inside, and of 2^n cells none has any.
   const Point anchor = finest->info.frame.to_domain(0, 0);
   const double root = std::ldexp(kCells * step, levels - 1);
-  const auto before = [&](double from, double low, double high) {
-    return from - std::ceil((from - (low + high - root) / 2) / step) * step;
+  const auto before = [&](double from, double low) {
+    return from - std::ceil((from - low) / step - 1e-6) * step - root / 4;
   };
-  t.half_ = 0.5 * step, t.origin_ = {before(anchor.x, e.xmin, e.xmax), before(anchor.y, e.ymin, e.ymax)};
+  t.half_ = 0.5 * step, t.origin_ = {before(anchor.x, e.xmin), before(anchor.y, e.ymin)};
   std::vector<std::vector<double>> bottoms(static_cast<std::size_t>(levels));
   for (const Grid& g : db.grids())
     for (int l = 0; l < g.info.shape.levels(); ++l) {

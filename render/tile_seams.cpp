@@ -53,8 +53,8 @@ class SeamMaker {
       const TileFacts& facts = node(key).facts;
       draw.x = lattice_.first_x(key) - origin[0], draw.y = lattice_.first_y(key) - origin[1];
       draw.stride = 1u << key.level, draw.slot = node(key).slot;
-      draw.reducible = float(facts.reducible), draw.holes = holed_[order_[d]],
-      draw.patches = float(facts.patches), draw.effects = effects_[order_[d]];
+      draw.patches = float(facts.patches), draw.holes = holed_[order_[d]];
+      draw.effects = effects_[order_[d]];
       for (int c = 0; c < 4; ++c)
         draw.corners[std::size_t(c)] = owner(key.level, key.x + (c & 1), key.y + (c >> 1));
       for (int s = 0; s < 4; ++s) make_side(key, s, draw);

@@ -30,10 +30,10 @@ struct TileDraw {
   std::array<std::uint32_t, 4> middles;  ///< texels: position 64 of each side
   /// Of each side: the draws whose blocks share its first and its second half's edges; kAlone for none.
   std::array<std::uint32_t, 4> beside_near, beside_far;
-  float reducible = 0;  ///< metres (TileFacts)
+  float patches = 0;  ///< that the tile was made of
   std::uint32_t holes = 0;
-  float patches = 0;          ///< that the tile was made of
   std::uint32_t effects = 0;  ///< what the gate said of it
+  std::uint32_t unused = 0;
   bool operator==(const TileDraw&) const = default;
 
   static constexpr std::uint32_t kAlone = 0xffffffffu;

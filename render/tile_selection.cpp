@@ -50,8 +50,7 @@ class Selector {
     // What finer tiles show may stick out of what this one knows by its error.
     const Box3 around{box.place, box.lowest - node.facts.error, box.highest + node.facts.error};
     leaf.drawn = !node.empty && frustum_.sees(around);
-    if (leaf.drawn)
-      leaf.pixels = node.facts.error > 0 ? node.facts.error * frustum_.pixels_per_metre(box) : 0;
+    if (leaf.drawn) leaf.pixels = pixels_of(key, node.facts, box);
     const auto place = std::uint32_t(out_.leaves.size());
     out_.leaves.push_back(leaf);
     out_.tiles[key] = place;
@@ -65,6 +64,24 @@ class Selector {
     if (leaf.pixels <= options_.pixel_error || key.level == 0) return;
     queue_.push_back(place);
     std::push_heap(queue_.begin(), queue_.end(), worse());
+  }
+
+  // Of its parts in sight only where it would be too coarse as a whole.
+  double pixels_of(const TileKey& key, const TileFacts& facts, const Box3& box) const {
+    const double whole = facts.error > 0 ? facts.error * frustum_.pixels_per_metre(box) : 0;
+    if (whole <= options_.pixel_error) return whole;
+    const double side = lattice_.step(key.level) * TileLattice::kCells / TileFacts::kParts;
+    double most = 0;
+    for (int y = 0; y < TileFacts::kParts; ++y)
+      for (int x = 0; x < TileFacts::kParts; ++x) {
+        const auto& [error, heights] = facts.part(x, y);
+        if (error <= 0) continue;
+        const double west = box.place.xmin + x * side, south = box.place.ymin + y * side;
+        const Box3 part{{west, south, west + side, south + side}, heights.lowest, heights.highest};
+        const Box3 around{part.place, heights.lowest - error, heights.highest + error};
+        if (frustum_.sees(around)) most = std::max(most, error * frustum_.pixels_per_metre(part));
+      }
+    return most;
   }
 
   // Whatever the terrain there is now.

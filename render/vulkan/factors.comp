@@ -10,8 +10,8 @@
 layout(local_size_x = 64) in;  // the blocks of a tile
 
 layout(binding = 3) uniform usamplerBuffer blocks;  // two texels a block, floats, metres: errors when every 2nd, 4th,
-                                                   // 8th vertex is kept, lowest, highest, and those errors as published
-                                                   // in the other three places
+                                                   // 8th vertex is kept, lowest, highest; in the other three places those
+                                                   // errors as published, or what its patches lack
 layout(binding = 4) writeonly buffer Factors { uint factors[]; };
 
 const uint kOut = 256u;
@@ -29,7 +29,7 @@ void main() {
   if (nearest > frame.axis.w) {
     // As published: one number for all of the picture, though its corners show more.
     const float stretch = published ? 1.0 : stretch_in(view.bottom, view.top);
-    const float allowed = nearest / (frame.detail.x * stretch) - (published ? 0.0 : facts_at(d).x);
+    const float allowed = nearest / (frame.detail.x * stretch) - (published ? 0.0 : errors.w);
     if (error.z <= allowed) segments = 1;
     else if (error.y <= allowed) segments = 2;
     else if (error.x <= allowed) segments = 4;

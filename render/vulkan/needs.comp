@@ -32,10 +32,10 @@ void main() {
   const BlockView view = view_of(draw, b, uintBitsToFloat(facts.xy));
   Mesh mesh = Mesh(uvec2(0), 0, false, false);
   if (view.seen) {
-    const float metres = view.depth / (frame.detail.x * stretch_in(view.bottom, view.top)) - facts_at(d).x;
+    const float metres = view.depth / (frame.detail.x * stretch_in(view.bottom, view.top)) - uintBitsToFloat(facts.w);
     const bool finest = !(view.depth > frame.axis.w && metres >= 0);
-    mesh = needed(block, finest ? -1 : clamp((floatBitsToInt(metres) >> kCodeShift) - int(facts.z), -1, 254));
-    mesh.falls = facts.w != 0;
+    mesh = needed(block, finest ? -1 : clamp((floatBitsToInt(metres) >> kCodeShift) - (int(facts.z) >> 1), -1, 254));
+    mesh.falls = (facts.z & 1u) != 0;
   }
   needs[d * 64 + b] = packed(mesh);
 }

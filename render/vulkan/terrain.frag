@@ -20,7 +20,7 @@ Ground ground_here() {
   const vec2 at = look.light_map.xy + place.xy * look.light_map.z;
   g.horizon = has_shadow ? texture(sun_map, (at + 0.5) / vec2(textureSize(sun_map, 0))).x : 0.0;
   g.open = has_sky ? texture(sky_map, (0.25 * at + 0.5) / vec2(textureSize(sky_map, 0))).x : 1.0;
-  g.value = has_cost ? facts_at(int(local.z + 0.5)).z : has_scale ? texture(knowledge, local.xyw).x : 0.0;
+  g.value = has_cost ? patches_of(int(local.z + 0.5)) : has_scale ? texture(knowledge, local.xyw).x : 0.0;
   g.source = vec3(0);
   if (has_source) g.source = class_color(int(texelFetch(knowledge, ivec3(local.xy * vec2(textureSize(knowledge, 0)), int(local.w + 0.5)), 0).y));
   return g;

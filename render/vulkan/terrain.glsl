@@ -30,7 +30,8 @@ ivec2 at_side(int s, int along) {
   const int end = (s & 1) * (kBlocks - 1);
   return s < 2 ? ivec2(end, along) : ivec2(along, end);
 }
-vec4 facts_at(int d) { return uintBitsToFloat(texelFetch(draws, d * kDraw + 9)); }
+// How many patches the tile of a draw was made of.
+float patches_of(int d) { return uintBitsToFloat(texelFetch(draws, d * kDraw + 9).x); }
 
 // The texel of the vertex at half cells `at` of a tile; inside the tile both are even. One way for all: lavapipe
 // runs both sides of every branch.

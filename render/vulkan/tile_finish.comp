@@ -1,7 +1,6 @@
 #version 450
 // A tile whose blocks are tessellated: a block's errors are those of every 2nd, 4th and 8th vertex.
 #extension GL_GOOGLE_include_directive : require
-const bool kTwisting = false;
 #include "tile_finish.glsl"
 
 layout(constant_id = 1) const bool kPublished = false;
@@ -47,12 +46,15 @@ float published(int base, ivec2 block, int size) {
   return worst;
 }
 
+void note_bend(int base, ivec2 block, ivec2 at, vec2 bend) {}
+
 void measure(int base, int bound_base, int slot, int b) {
   const ivec2 block = ivec2(b % 8, b / 8) * kBlockSamples;
-  const BlockFacts f = facts_of(base, bound_base, block);
+  const BlockFacts f = facts_of(base, bound_base, b);
   const float between = push.between * (f.bend.x + f.bend.y);
   vec4 error = vec4(kNothing);
-  vec3 own = vec3(kNothing);
+  const float lack = reducible(b, f.bound);
+  vec3 own = vec3(kPublished ? kNothing : lack);
   if (!f.holes) {
     for (int d = 0; kPublished && d < 3; ++d) own[d] = published(base, block, 4 << d);
     for (int d = 0; d < 4; ++d) error[d] = between + largest_span(base, block, 2 << d);
@@ -61,5 +63,5 @@ void measure(int base, int bound_base, int slot, int b) {
   const vec2 range = vec2(f.low + push.shift - between, f.high + push.shift + between);
   blocks[(slot * 64 + b) * 2] = floatBitsToUint(vec4(error.yzw, own.x));
   blocks[(slot * 64 + b) * 2 + 1] = floatBitsToUint(vec4(range, own.yz));
-  note_facts(b, f, between, error.x);
+  note_facts(b, f, between, error.x, lack);
 }

@@ -8,10 +8,11 @@ layout(binding = 0) uniform samplerBuffer results;  // planes: heights, bounds, 
 layout(binding = 1) writeonly buffer Heights { float heights[]; };
 layout(binding = 2) writeonly buffer Blocks { uvec4 blocks[]; };  // facts of the blocks of slots
 layout(binding = 3, rg16f) writeonly uniform image2DArray slopes;
-layout(binding = 4) writeonly buffer Summaries { float summaries[]; };  // kSummary a tile
+layout(binding = 4) writeonly buffer Summaries { float summaries[]; };  // kSummary a block
 layout(binding = 5) readonly buffer Slots { uint slots[]; };
 layout(binding = 6, rg16f) writeonly uniform image2DArray knowledge;    // only with kKnowing: bound, source
 layout(binding = 7) uniform isamplerBuffer words;                       // the results as whole numbers
+layout(binding = 8) readonly buffer Lacks { vec2 lacks[]; };  // of blocks: TilePatches::Block
 layout(constant_id = 0) const bool kKnowing = false;
 layout(push_constant) uniform Push {
   uint bound_at, slope_at;  // where planes begin
@@ -20,10 +21,8 @@ layout(push_constant) uniform Push {
   uint source_at;
 } push;
 
-const int kVertices = 65, kSide = 131, kBlockSamples = 16, kSummary = 8;
+const int kVertices = 65, kSide = 131, kBlockSamples = 16, kSummary = 5;
 #define kNothing uintBitsToFloat(0x7f800000u)
-
-shared float tile_facts[64][6];
 
 int first_of(int tile) { return tile * kSide * kSide; }
 // Half cell (c, r) of the tile.
@@ -39,18 +38,16 @@ float second_difference(int base, ivec2 at, ivec2 step, float here) {
 struct BlockFacts {
   float low, high, bound;
   vec2 bend;
-  float twist;  // only with kTwisting: what bends squares of half cells from their corners' planes
   bool holes;
 };
 
-float twist_of(int base, ivec2 at, float here) {
-  const float beside = height_at(base, at + ivec2(1, 0)), above = height_at(base, at + ivec2(0, 1));
-  const float t = abs(here - beside - above + height_at(base, at + 1));
-  return isnan(t) ? 0 : t;
-}
+// Second differences at a sample of a block, counted from the block's corner.
+void note_bend(int base, ivec2 block, ivec2 at, vec2 bend);
 
-BlockFacts facts_of(int base, int bound_base, ivec2 block) {
-  BlockFacts f = BlockFacts(kNothing, -kNothing, 0, vec2(0), 0, false);
+BlockFacts facts_of(int base, int bound_base, int b) {
+  BlockFacts f = BlockFacts(kNothing, -kNothing, 0, vec2(0), false);
+  const ivec2 block = ivec2(b % 8, b / 8) * kBlockSamples;
+  if (lacks[gl_WorkGroupID.x * 64 + b].x < 0) return f;  // at most its border has heights
   for (int r = 0; r <= kBlockSamples; ++r)
     for (int c = 0; c <= kBlockSamples; ++c) {
       const ivec2 at = block + ivec2(c, r);
@@ -62,17 +59,24 @@ BlockFacts facts_of(int base, int bound_base, ivec2 block) {
       f.low = min(f.low, h), f.high = max(f.high, h);
       f.bound = max(f.bound, texelFetch(results, bound_base + (at.y + 1) * kSide + at.x + 1).x);
       const float x = second_difference(base, at, ivec2(1, 0), h), y = second_difference(base, at, ivec2(0, 1), h);
-      f.bend = max(f.bend, vec2(isnan(x) ? 0 : x, isnan(y) ? 0 : y));
-      if (kTwisting && r < kBlockSamples && c < kBlockSamples) f.twist = max(f.twist, twist_of(base, at, h));
+      const vec2 bend = vec2(isnan(x) ? 0 : x, isnan(y) ? 0 : y);
+      f.bend = max(f.bend, bend);
+      note_bend(base, block, ivec2(c, r), bend);
     }
   return f;
 }
 
-// `error`: of the block with all its vertices, where it has no holes.
-void note_facts(int b, BlockFacts f, float between, float error) {
-  tile_facts[b][0] = f.low - between, tile_facts[b][1] = f.high + between;
-  tile_facts[b][2] = f.holes ? 0 : error, tile_facts[b][3] = f.bound;
-  tile_facts[b][4] = f.holes ? 1 : 0, tile_facts[b][5] = f.low <= f.high ? 1 : 0;
+// What a block may be off because of its patches, not of its mesh.
+float reducible(int b, float bound) {
+  const vec2 lack = lacks[gl_WorkGroupID.x * 64 + b];
+  return max(0, lack.x) + max(0, bound - lack.y);
+}
+
+// `error`: of the block with all its vertices, where it has no holes; `lack`: reducible().
+void note_facts(int b, BlockFacts f, float between, float error, float lack) {
+  const uint first = (gl_WorkGroupID.x * 64 + b) * kSummary;
+  summaries[first] = f.low - between, summaries[first + 1] = f.high + between;
+  summaries[first + 2] = lack + (f.holes ? 0 : error), summaries[first + 3] = f.bound, summaries[first + 4] = f.holes ? 1 : 0;
 }
 
 void measure(int base, int bound_base, int slot, int b);
@@ -97,11 +101,5 @@ void main() {
     const float bound = texelFetch(results, int(push.bound_at) + texel).x;
     const int source = texelFetch(words, int(push.source_at) + texel).x;
     imageStore(knowledge, ivec3(at, slot), vec4(isnan(bound) ? 0 : bound, source, 0, 0));
-  }
-  barrier();
-  if (lane < 6) {
-    float f = tile_facts[0][lane];
-    for (int k = 1; k < 64; ++k) f = lane == 0 ? min(f, tile_facts[k][lane]) : max(f, tile_facts[k][lane]);
-    summaries[tile * kSummary + lane] = f;
   }
 }

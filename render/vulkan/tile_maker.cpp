@@ -8,6 +8,7 @@
 #include "db/stopwatch.h"
 #include "query/extract.h"
 #include "render/tile_cut.h"
+#include "render/tile_patches.h"
 #include "render/vulkan/shaders.h"
 #include "render/vulkan/tile_store_impl.h"
 
@@ -17,12 +18,14 @@ namespace {
 
 constexpr int kSide = TileLattice::kSamples + 2;  // with the halo
 constexpr std::uint32_t kMost = 64;               // tiles of a submission
-constexpr std::uint32_t kSummary = 8;             // floats of a tile: tile_finish.glsl
+constexpr std::uint32_t kBlocks = 64;             // of a tile
+constexpr std::uint32_t kSummary = 5;             // floats of a block: tile_finish.glsl
 constexpr VkDescriptorType kTypes[] = {
     VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
     VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
     VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,       VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
-    VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,        VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER};
+    VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,        VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER};
 
 struct FinishPush {
   std::uint32_t bound_at, slope_at;
@@ -30,56 +33,9 @@ struct FinishPush {
   std::uint32_t source_at;
 };
 
-Extent with_halo(const TileLattice& lattice, const TileKey& key) {
-  Extent e = lattice.bounds(key);
-  const double halo = lattice.step(key.level);
-  return {e.xmin - halo, e.ymin - halo, e.xmax + halo, e.ymax + halo};
-}
-
 Tile sampled_tile(const TileLattice& lattice, const TileKey& key) {
   const int stride = 1 << key.level;
   return {lattice.first_x(key) - stride, lattice.first_y(key) - stride, stride, kSide, kSide};
-}
-
-// What a tile's patches say of it: do they come of one grid, and what do samples miss between them.
-struct PatchFacts {
-  std::size_t patches = 0;
-  double accuracy = 0;   // metres: of the grid, where there is only one
-  double unsampled = 0;  // metres
-  HeightRange heights;   // of their grids' surfaces
-};
-
-// A patch with cells smaller than the distance of samples may stick out between these by as much as it
-// departs from the patch of its own grid that they do resolve, twice: up here, down there.
-double missed(const Grid& grid, const PatchId& id, double spacing) {
-  const double step = grid.info.frame.finer_step();
-  int level = id.level(), bx = id.bx(), by = id.by();
-  if (std::ldexp(step, level) >= spacing * 0.99) return 0;
-  double bottom = grid.at(level, bx, by).bottom;
-  while (std::ldexp(step, level) < spacing * 0.99 && level + 1 < grid.info.shape.levels()) {
-    ++level, bx >>= 1, by >>= 1;
-    const PatchRecord p = grid.at(level, bx, by);
-    if (p.exists()) bottom = std::max(bottom, p.bottom);
-  }
-  return 2 * std::max(0.0, bottom - grid.info.accuracy);
-}
-
-PatchFacts facts_of(const Database& db, const std::vector<Blend::Placed>& placed, const Extent& place,
-                    double spacing) {
-  PatchFacts f;
-  const Grid* only = nullptr;
-  bool several = false;
-  const Database::Reading reading = db.reading();
-  for (const Blend::Placed& p : placed) {
-    if (!p.bounds.meets(place)) continue;
-    const Grid& grid = db.grid(p.id.grid());
-    several |= only && only != &grid;
-    only = &grid, ++f.patches;
-    f.heights.add(grid.info.surface_heights());
-    f.unsampled = std::max(f.unsampled, missed(grid, p.id, spacing));
-  }
-  if (only && !several) f.accuracy = only->info.accuracy + only->info.quantisation;
-  return f;
 }
 
 }  // namespace
@@ -98,7 +54,7 @@ struct TileMaker::Impl {
   vk::OwnedPipeline finish;
   VkDescriptorSet set = VK_NULL_HANDLE;
   vk::OwnedSets sets;
-  vk::Buffer summaries, slots;
+  vk::Buffer summaries, slots, lacks;
   vk::Commands commands;
   TileMakerCounts counts;
 
@@ -115,15 +71,17 @@ struct TileMaker::Impl {
         bindings(device->impl(), kTypes, sizeof(FinishPush)),
         finish(make_finish()),
         sets(bindings.make_set(set)),
-        summaries(device->impl(), kMost * kSummary * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+        summaries(device->impl(), kMost * kBlocks * kSummary * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
                   vk::Where::readback),
         slots(device->impl(), kMost * 4, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, vk::Where::upload),
+        lacks(device->impl(), kMost * kBlocks * sizeof(TilePatches::Block),
+              VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, vk::Where::upload),
         commands(device->impl()) {
     bindings.bind(set, 1, store.heights), bindings.bind(set, 2, store.blocks);
     bindings.bind(set, 3, VK_NULL_HANDLE, store.slopes.view(), VK_IMAGE_LAYOUT_GENERAL);
     const vk::Texture& knowledge = store.knowledge ? *store.knowledge : store.slopes;
     bindings.bind(set, 6, VK_NULL_HANDLE, knowledge.view(), VK_IMAGE_LAYOUT_GENERAL);
-    bindings.bind(set, 4, summaries), bindings.bind(set, 5, slots);
+    bindings.bind(set, 4, summaries), bindings.bind(set, 5, slots), bindings.bind(set, 8, lacks);
   }
 
   vk::OwnedPipeline make_finish() const {
@@ -145,11 +103,14 @@ struct TileMaker::Impl {
   }
 
   // The submission's results go to the slots of its tiles, and each tile's summary to the host.
-  void run_finish(const vk::Frame& frame, std::span<const std::uint32_t> to) {
+  void run_finish(const vk::Frame& frame, std::span<const std::uint32_t> to,
+                  std::span<const TilePatches> patches) {
     const vk::OwnedView results = vk::texels(device->impl(), frame.results_on_card(), VK_FORMAT_R32_SFLOAT);
     const vk::OwnedView words = vk::texels(device->impl(), frame.results_on_card(), VK_FORMAT_R32_SINT);
     bindings.bind(set, 0, results), bindings.bind(set, 7, words);
     std::copy(to.begin(), to.end(), reinterpret_cast<std::uint32_t*>(slots.mapped()));
+    auto* lack = reinterpret_cast<TilePatches::Block*>(lacks.mapped());
+    for (const TilePatches& p : patches) lack = std::copy(p.blocks.begin(), p.blocks.end(), lack);
     const auto plane = std::uint32_t(to.size() * kSide * kSide);  // heights, bounds, perhaps sources, slopes
     const FinishPush p{plane, (2 + planes().source) * plane, float(blend->impl().base - base),
                        options.smoothness == 0 ? 0.5f : 0.25f, 2 * plane};
@@ -163,30 +124,38 @@ struct TileMaker::Impl {
     commands.submit(), commands.wait();
   }
 
-  TileFacts summary(std::size_t k, const TileKey& key, const PatchFacts& patches, bool improvable) const {
-    const float* s = reinterpret_cast<const float*>(summaries.mapped()) + k * kSummary;
-    TileFacts f;
+  // From what was measured of its blocks.
+  TileFacts summary(std::size_t k, const TileKey& key, const TilePatches& patches) const {
+    constexpr int kSide = TilePatches::kBlocks, kShare = kSide / TileFacts::kParts;
+    const float* s = reinterpret_cast<const float*>(summaries.mapped()) + k * kBlocks * kSummary;
     const double shift = blend->impl().base;
-    f.lowest = double(s[0]) + shift, f.highest = double(s[1]) + shift;
-    // All of its data may lie between its samples.
-    if (!(f.lowest <= f.highest)) f.lowest = patches.heights.lowest, f.highest = patches.heights.highest;
-    f.bound = double(s[3]), f.holes = s[4] > 0, f.patches = patches.patches;
-    f.reducible = patches.unsampled + (improvable ? std::max(0.0, f.bound - patches.accuracy) : 0);
-    f.error = double(s[2]) + f.reducible;
-    // A hole's outline is drawn to a cell.
-    if (f.holes) f.error = std::max(f.error, 1.5 * lattice.step(key.level));
+    TileFacts f;
+    f.patches = patches.patches;
+    HeightRange all;
+    for (int b = 0; b < int(kBlocks); ++b, s += kSummary) {
+      if (!patches.blocks[std::size_t(b)].reached()) continue;
+      const bool holes = s[4] > 0;
+      f.holes |= holes;
+      HeightRange heights{double(s[0]) + shift, double(s[1]) + shift};
+      // All of its data may lie between its samples.
+      if (!(heights.lowest <= heights.highest)) heights = patches.heights;
+      TileFacts::Part& part = f.part(b % kSide / kShare, b / kSide / kShare);
+      // A hole's outline is drawn to a cell.
+      part.error = std::max({part.error, double(s[2]), holes ? 1.5 * lattice.step(key.level) : 0});
+      part.heights.add(heights), all.add(heights);
+      f.error = std::max(f.error, part.error), f.bound = std::max(f.bound, double(s[3]));
+    }
+    f.lowest = all.lowest, f.highest = all.highest;
     return f;
   }
 
   std::vector<Made> make(std::span<const TileKey> tiles, const TakeSlot& take_slot);
   void blend_tiles(std::span<const TileKey> tiles, std::span<const std::uint32_t> to,
-                   std::span<const PatchFacts> facts, const std::vector<PatchId>& sorted,
-                   std::vector<Made>& made);
+                   std::span<const TilePatches> patches, std::vector<Made>& made);
 };
 
 void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<const std::uint32_t> to,
-                                  std::span<const PatchFacts> facts, const std::vector<PatchId>& sorted,
-                                  std::vector<Made>& made) {
+                                  std::span<const TilePatches> patches, std::vector<Made>& made) {
   std::vector<Tile> sampled;
   for (const TileKey& k : tiles) sampled.push_back(sampled_tile(lattice, k));
   VulkanBlend::Impl& b = blend->impl();
@@ -203,13 +172,11 @@ void TileMaker::Impl::blend_tiles(std::span<const TileKey> tiles, std::span<cons
       },
       [&](const vk::Frame& submission, std::size_t first, std::size_t n) {
         const Stopwatch watch;
-        run_finish(submission, to.subspan(first, n));
+        run_finish(submission, to.subspan(first, n), patches.subspan(first, n));
         ++counts.dispatches;
         for (std::size_t k = 0; k < n; ++k) {
           const TileKey& key = tiles[first + k];
-          const bool improvable =
-              lattice.error(key.level) > 0 && is_improvable(db, sorted, with_halo(lattice, key));
-          made.push_back({key, summary(k, key, facts[first + k], improvable), to[first + k]});
+          made.push_back({key, summary(k, key, patches[first + k]), to[first + k]});
         }
         finishing += watch.milliseconds();
       });
@@ -241,22 +208,22 @@ std::vector<TileMaker::Made> TileMaker::Impl::make(std::span<const TileKey> tile
   std::sort(sorted.begin(), sorted.end());
   std::vector<TileKey> filled;
   std::vector<std::uint32_t> to;
-  std::vector<PatchFacts> facts;
+  std::vector<TilePatches> patches;
   for (std::size_t k = 0; k < tiles.size(); ++k) {
     assert(tiles[k].level == level);
-    const PatchFacts f = facts_of(db, blend->impl().placed, places[k], 0.5 * lattice.step(level));
-    if (f.patches == 0) {
+    const TilePatches p = TilePatches::of(db, blend->impl().placed, sorted, lattice, tiles[k]);
+    if (!p.reached()) {
       made.push_back({tiles[k], {}, TileCache::kNoSlot});
       continue;
     }
     const std::uint32_t slot = take_slot(tiles[k]);
     if (slot == TileCache::kNoSlot) break;
-    filled.push_back(tiles[k]), to.push_back(slot), facts.push_back(f);
+    filled.push_back(tiles[k]), to.push_back(slot), patches.push_back(p);
   }
   for (std::size_t from = 0; from < filled.size(); from += kMost) {
     const std::size_t n = std::min<std::size_t>(kMost, filled.size() - from);
     blend_tiles(std::span(filled).subspan(from, n), std::span(to).subspan(from, n),
-                std::span(facts).subspan(from, n), sorted, made);
+                std::span(patches).subspan(from, n), made);
   }
   counts.tiles += filled.size();
   return made;
@@ -277,12 +244,8 @@ void TileMaker::prefetch(const Database& db, const TileLattice& lattice, const T
   std::vector<PatchId> patches = extract(db, TileCut(lattice.error(tile.level), {place})).patches;
   for (const PatchId id : patches) db.surface(id);
   // Making it asks for more records and pages than those.
-  {
-    const Database::Reading reading = db.reading();
-    for (const PatchId id : patches) missed(db.grid(id.grid()), id, 0.5 * lattice.step(tile.level));
-  }
   std::sort(patches.begin(), patches.end());
-  if (lattice.error(tile.level) > 0) is_improvable(db, patches, place);
+  TilePatches::prefetch(db, patches, lattice, tile);
 }
 
 void TileMaker::restart() {

@@ -133,7 +133,7 @@ TEST_F(InsertionTest, WithAFullPoolWhatChangedIsMadeAnew) {
   for (const bool realtime : {false, true}) {
     Database db = reader();
     RendererOptions options{
-        .width = kWidth, .height = kHeight, .pixel_error = 0.1, .memory = std::size_t{40} << 20};
+        .width = kWidth, .height = kHeight, .pixel_error = 0.01, .memory = std::size_t{40} << 20};
     options.realtime = realtime;
     Renderer r(test_device(), db, options);
     const Camera camera{{800, 300, 900}, {800, 800, 300}, 60, kWidth, kHeight};
@@ -142,7 +142,7 @@ TEST_F(InsertionTest, WithAFullPoolWhatChangedIsMadeAnew) {
       for (int n = 0; realtime && n < 5000 && last.tiles_wanted > 0; ++n) last = r.draw(camera);
       return last;
     };
-    EXPECT_GT(settle().pixels_reached, 0.1) << "the pool is too small";
+    EXPECT_GT(settle().pixels_reached, 0.01) << "the pool is too small";
     insert(2);
     for (int n = 0; n < 5000 && !r.refresh(db); ++n) r.draw(camera);
     const FrameStats after = settle();

@@ -1,6 +1,7 @@
 // The mesh that compute shaders make of the terrain: no gap, no vertex inside an edge, what hardware shows.
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <map>
 #include <numeric>
 #include <set>
@@ -82,6 +83,79 @@ TEST_F(TerrainTest, AMeshCoversEachBlockOnceAndNoVertexLiesInsideAnEdge) {
   EXPECT_GT(edges, 50000u);
   EXPECT_GT(levels, 3u);
   report_case("EdgeSplit", "edges of 24 meshes with a vertex inside", edges, double(torn), 0, "edges");
+}
+
+// Which half cells of a tile have data, as its level answers.
+std::vector<bool> data_in(const Database& db, const TileLattice& lattice, const TileKey& key) {
+  const Blend blend(db, extract(db, {.error = lattice.error(key.level)}).patches, {.smoothness = 1});
+  const RasterFrame frame = lattice.frame();
+  Points points;
+  for (int y = 0; y < TileLattice::kSamples; ++y)
+    for (int x = 0; x < TileLattice::kSamples; ++x)
+      points.add(
+          frame.at((lattice.first_x(key) + (x << key.level)), (lattice.first_y(key) + (y << key.level))));
+  Answers answers(points.size());
+  blend.at_points(points.x, points.y, answers.out());
+  std::vector<bool> data;
+  for (const auto source : answers.source) data.push_back(source != 0);
+  return data;
+}
+
+// Around holes, and only there, the mesh is as fine as it gets.
+TEST_F(VulkanTest, TrianglesOfAMeshAreWhollyDataOrWhollyHoleOrAsSmallAsTheyGet) {
+  GridFile file = survey({.width = 200, .height = 160, .geotransform = rotated(100, 1500, 20, 9, 9)}, 0.1);
+  file.nodata = -9999;
+  file.at = [at = file.at](int i, int j) {
+    const bool pond = std::hypot(i - 70, j - 60) < 25, pixel = i % 37 == 5 && j % 41 == 7;
+    return pond || pixel ? kHole : at(i, j);
+  };
+  const Land land({file});
+  std::mt19937_64 random(test_seed(61));
+  Renderer r(test_device(), land.db(),
+             {.width = kWidth, .height = kHeight, .pixel_error = 3, .tessellation = Tessellation::mesh});
+  std::size_t mixed = 0, large_mixed = 0, large = 0, large_empty = 0;
+  std::map<std::pair<std::uint32_t, int>, std::pair<int, int>> blocks;  // triangles, mixed ones
+  for (int n = 0; n < 4; ++n) {
+    const Camera camera = random_camera(land.db(), random);
+    r.draw(camera);
+    const auto origin = half_cell_at(r.lattice(), {camera.eye.x, camera.eye.y});
+    const auto mesh = r.mesh();
+    std::map<std::uint32_t, std::vector<bool>> data;
+    blocks.clear();
+    for (std::size_t t = 0; t < mesh.size(); t += 3) {
+      const MeshVertex *a = &mesh[t], *b = a + 1, *c = a + 2;
+      const auto [west, east] = std::minmax({a->x, b->x, c->x});
+      const auto [south, north] = std::minmax({a->y, b->y, c->y});
+      // What neighbours have on a tile's border is theirs.
+      if (west < 16 || south < 16 || east > 112 || north > 112) continue;
+      const TileDraw& draw = r.drawn().draws[a->draw];
+      const int level = std::countr_zero(draw.stride);
+      const TileKey key{level, (draw.x + origin[0]) >> (7 + level), (draw.y + origin[1]) >> (7 + level)};
+      auto& has = data[a->draw];
+      if (has.empty()) has = data_in(land.db(), r.lattice(), key);
+      const auto turn = [](const MeshVertex& p, const MeshVertex& q, int x, int y) {
+        return (q.x - p.x) * (y - p.y) - (q.y - p.y) * (x - p.x);
+      };
+      std::size_t some = 0, none = 0;
+      for (int y = south; y <= north; ++y)
+        for (int x = west; x <= east; ++x)
+          if (turn(*a, *b, x, y) >= 0 && turn(*b, *c, x, y) >= 0 && turn(*c, *a, x, y) >= 0)
+            ++(has[std::size_t(y * TileLattice::kSamples + x)] ? some : none);
+      const bool is_large = turn(*a, *b, c->x, c->y) > 4;
+      auto& [triangles, partly] = blocks[{a->draw, 8 * ((south + north) / 32) + (west + east) / 32}];
+      ++triangles;
+      if (some > 0 && none > 0) ++partly, ++mixed, large_mixed += is_large;
+      large += is_large && none == 0, large_empty += is_large && some == 0;
+    }
+    std::size_t holed = 0, part = 0;
+    for (const auto& [block, counts] : blocks)
+      if (counts.second > 0) ++holed, part += std::size_t(counts.first);
+    EXPECT_LE(part, 100 * holed) << "not all of a block's 128 triangles";
+  }
+  EXPECT_EQ(large_mixed, 0u);
+  EXPECT_GT(mixed, 100u);
+  EXPECT_GT(large, 100u);
+  EXPECT_GT(large_empty, 5u);
 }
 
 }  // namespace

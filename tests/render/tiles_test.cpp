@@ -6,7 +6,9 @@
 #include <random>
 #include <set>
 
+#include "blend/placed.h"
 #include "render/tile_cut.h"
+#include "render/tile_patches.h"
 #include "render/tile_seams.h"
 #include "tests/blend/scene.h"
 #include "tests/hard_case.h"
@@ -145,8 +147,12 @@ class Woods {
       cache.put(key, {}, TileCache::kNoSlot);
       return;
     }
-    TileFacts f{.lowest = 200, .highest = 400, .holes = (key.x + 3 * key.y + key.level) % 11 == 0};
-    f.error = lattice_.step(key.level) * 0.1 * (0.2 + double(random_() % 100) / 50);
+    TileFacts f;
+    f.lowest = 200, f.highest = 400, f.holes = (key.x + 3 * key.y + key.level) % 11 == 0;
+    for (TileFacts::Part& part : f.parts) {
+      part = {lattice_.step(key.level) * 0.1 * (0.2 + double(random_() % 100) / 50), {200, 400}};
+      f.error = std::max(f.error, part.error);
+    }
     cache.put(key, f, cache.take_slot(key));
     if (key.level > lattice_.levels() - 7 && chance(share))
       for (int c = 0; c < 4; ++c) grow(key.child(c), 0.9);
@@ -154,6 +160,87 @@ class Woods {
   std::mt19937_64 random_;
   TileLattice lattice_;
 };
+
+// With one grid its accuracy stays: with several another one's may be the best.
+TEST(TilePatches, BlocksAreNoFartherFromTheBestSurfaceThanTheirPatchesSay) {
+  const std::vector<GridFile> grids = surveys();
+  std::mt19937_64 random(test_seed(71));
+  for (const bool alone : {true, false}) {
+    const Land some(alone ? std::vector<GridFile>{grids[0]} : grids);
+    const Database& db = some.db();
+    const TileLattice lattice = TileLattice::over(db);
+    const Blend best(db, extract(db, {.error = 0}).patches, {.smoothness = 1});
+    std::size_t blocks = 0, tight = 0, unreached = 0;
+    double most = 0;
+    for (int n = 0; n < 40; ++n) {
+      const int level = lattice.levels() - 1 - int(random() % 5), side = 1 << (lattice.levels() - 1 - level);
+      const TileKey key{level, int(random() % std::uint64_t(side)), int(random() % std::uint64_t(side))};
+      const Extraction x = extract(db, TileCut(lattice.error(level), {with_halo(lattice, key)}));
+      if (x.patches.empty()) continue;
+      std::vector<PatchId> ids = x.patches;
+      std::sort(ids.begin(), ids.end());
+      std::vector<Blend::Placed> placed;
+      for (const PatchId id : ids) placed.push_back(place(db, id, 1));
+      const Extent e = lattice.bounds(key);
+      const TilePatches told = TilePatches::of(db, placed, ids, lattice, key);
+      const Blend own(db, x.patches, {.smoothness = 1});
+      for (int b = 0; b < 64; ++b) {
+        const double width = (e.xmax - e.xmin) / 8;
+        const Extent block{e.xmin + b % 8 * width, e.ymin + b / 8 * width, e.xmin + (b % 8 + 1) * width,
+                           e.ymin + (b / 8 + 1) * width};
+        const Points points = random_points(block, 60, random);
+        Answers here(points.size()), there(points.size());
+        own.at_points(points.x, points.y, here.out()), best.at_points(points.x, points.y, there.out());
+        const TilePatches::Block& lack = told.blocks[std::size_t(b)];
+        for (std::size_t k = 0; k < points.size(); ++k) {
+          if (here.source[k] == 0) continue;
+          ASSERT_TRUE(told.blocks[std::size_t(b)].reached());
+          const double apart = std::abs(here.height[k] - there.height[k]);
+          const double reducible = std::max(0.0, here.bound[k] - double(lack.lasting));
+          // What the best may be off is its own: of one grid, what a smooth surface departs from a bilinear
+          // one.
+          const double own_bound = alone ? there.bound[k] - db.grids()[0].info.accuracy : there.bound[k];
+          ASSERT_LE(apart, own_bound + reducible + 1e-9);
+          most = std::max(most, apart), tight += reducible < here.bound[k];
+        }
+        ++blocks, unreached += !told.blocks[std::size_t(b)].reached();
+      }
+    }
+    EXPECT_GT(blocks, 500u);
+    EXPECT_GT(most, 1.0);
+    EXPECT_GT(tight, 1000u);
+    EXPECT_GT(unreached, 50u);
+  }
+}
+
+// What is seen of a tile decides, and where in it: not its worst place.
+TEST(TileSelection, APartOutOfSightDoesNotSplitATile) {
+  const TileLattice lattice = TileLattice::over(land().db());
+  const TileKey root = lattice.root();
+  const Extent e = lattice.bounds(root);
+  const double side = e.xmax - e.xmin;
+  TileFacts facts;
+  facts.lowest = 200, facts.highest = 400;
+  for (int y = 0; y < 4; ++y)  // those around the eye are flat
+    for (int x = 0; x < 4; ++x) facts.part(x, y) = {x % 3 == 0 || y % 3 == 0 ? 0.01 : 0, {200, 400}};
+  facts.part(3, 3).error = facts.error = 50;
+  const auto reached = [&](double look_x, double look_y) {
+    TileCache cache{16, TilePolicy::lru};
+    cache.put(root, facts, cache.take_slot(root));
+    Selection selection;
+    // From the middle of the root.
+    const Point3 eye{e.xmin + side / 2, e.ymin + side / 2, 450};
+    const Camera camera{eye, {eye.x + look_x, eye.y + look_y, 440}, 60, 640, 360};
+    select_tiles(lattice, Frustum(camera), {.pixel_error = 1}, cache, selection);
+    EXPECT_EQ(selection.wanted.empty(), selection.pixels <= 1);
+    EXPECT_EQ(selection.drawn.size(), 1u);
+    return selection.pixels;
+  };
+  const double away = reached(-100, -100), towards = reached(100, 100);
+  EXPECT_LE(away, 1);
+  EXPECT_GT(towards, 5);
+  EXPECT_LT(towards, 1000) << "though all of the tile lies around the eye";
+}
 
 // By a millimetre up and down anywhere in a box where the picture shows it.
 TEST(Frustum, AVerticalMetreInABoxTakesNoMorePixelsThanItSays) {

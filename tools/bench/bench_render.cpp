@@ -17,6 +17,7 @@ namespace {
 
 constexpr int kFramesARun = 12;
 constexpr int kMeasured = 5, kEvery = 3;  // of so many frames of a flight, each so many pixels and rows
+constexpr int kCoarsest = 16;             // half octaves of pixels
 constexpr std::size_t kMeshVertices = std::size_t{2049} * 2049;  // a larger grid is not drawn as one mesh
 
 // Back and forth over the terrain, from a third of the extent's height up to a little over the summits.
@@ -142,7 +143,7 @@ class Flights {
       if (mesh_) t.mesh.push_back(peers.full_mesh(camera));
       if (!is_measured(k)) continue;
       measure(camera, ours.depth(), t.ours_off), measure(camera, published.depth(), t.published_off);
-      peers.chunked(ours), measure(camera, peers.depth(camera), t.chunked_off);
+      peers.stitched(ours), measure(camera, peers.depth(camera), t.chunked_off);
       if (mesh_) peers.full_mesh(camera), measure(camera, peers.depth(camera), t.mesh_off);
     }
     return flown(t, fmt::format("{} x {} at {:g} px", width, height, pixel_error),
@@ -158,7 +159,7 @@ class Flights {
       const Camera camera = path.frame(k, width, height);
       tiles.draw(camera);
       ms.push_back(peers.chunked(tiles));
-      if (is_measured(k)) measure(camera, peers.depth(camera), off);
+      if (is_measured(k)) peers.stitched(tiles), measure(camera, peers.depth(camera), off);
     }
     return {pixel_error, spread(ms), figures_of(off)};
   }
@@ -231,7 +232,13 @@ std::vector<Work> bench_render(const BenchOptions& o) {
     for (const double pixels : {1.0, 2.0, 4.0, 8.0}) flown.push_back(flights.fly(width, height, pixels));
     for (const Flown& f : flown) all.push_back(f.draw), all.push_back(f.frame);
     std::vector<ChunkFlight> chunked;
-    for (int k = 0; k <= 10; ++k) chunked.push_back(flights.fly_chunks(width, height, std::exp2(0.5 * k)));
+    // Coarser and coarser, until several are farther off than any of ours.
+    double most = 0;
+    for (const Flown& f : flown) most = std::max(most, f.ours.max);
+    for (int k = 0, beyond = 0; k <= kCoarsest && beyond < 3; ++k) {
+      chunked.push_back(flights.fly_chunks(width, height, std::exp2(0.5 * k)));
+      beyond = chunked.back().error.max > most ? beyond + 1 : 0;
+    }
     for (Work& w : at_equal_errors(flown, chunked)) all.push_back(std::move(w));
   }
   return all;

@@ -59,10 +59,12 @@ std::vector<std::uint32_t> grid_indices(int columns, int rows) {
 }
 
 vk::OwnedPipeline triangles(const vk::Bindings& bindings, VkRenderPass pass,
-                            std::span<const std::uint32_t> vert, std::span<const std::uint32_t> frag) {
+                            std::span<const std::uint32_t> vert, std::span<const std::uint32_t> frag,
+                            std::span<const std::uint32_t> constants = {}) {
   return vk::make_graphics(
       bindings, pass,
       {.stages = {{VK_SHADER_STAGE_VERTEX_BIT, vert}, {VK_SHADER_STAGE_FRAGMENT_BIT, frag}},
+       .constants = constants,
        .topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST});
 }
 
@@ -130,7 +132,7 @@ struct RenderPeers::Impl {
   const Device::Impl& card;
   vk::Target target;
   vk::Bindings mesh_bindings, tile_bindings;
-  vk::OwnedPipeline mesh_pipeline, plain_pipeline, chunk_pipeline, screen_pipeline;
+  vk::OwnedPipeline mesh_pipeline, plain_pipeline, chunk_pipeline, stitched_pipeline, screen_pipeline;
   VkDescriptorSet mesh_set = VK_NULL_HANDLE, plain_set = VK_NULL_HANDLE, tile_set = VK_NULL_HANDLE;
   vk::OwnedSets mesh_sets, plain_sets, tile_sets;
   vk::Buffer frame, plain_block, plain_indices, draws, chunk_indices;
@@ -143,6 +145,7 @@ struct RenderPeers::Impl {
   static constexpr VkDescriptorType kMeshTypes[] = {kUniform, kTexels};
   static constexpr VkDescriptorType kTileTypes[] = {kUniform, kTexels, kTexels, kImage};
   static constexpr std::size_t kMostDraws = 4096;
+  static constexpr std::uint32_t kStitched[] = {1};
 
   Impl(std::shared_ptr<Device> d, const Database& db, const Grid* grid, int width, int height)
       : device(std::move(d)),
@@ -153,6 +156,7 @@ struct RenderPeers::Impl {
         mesh_pipeline(triangles(mesh_bindings, target.pass(), kMeshVert, kMeshFrag)),
         plain_pipeline(triangles(mesh_bindings, target.pass(), kPlainVert, kPlainFrag)),
         chunk_pipeline(triangles(tile_bindings, target.pass(), kChunkVert, kSlopesFrag)),
+        stitched_pipeline(triangles(tile_bindings, target.pass(), kChunkVert, kSlopesFrag, kStitched)),
         screen_pipeline(triangles(tile_bindings, target.pass(), kScreenVert, kSlopesFrag)),
         mesh_sets(mesh_bindings.make_set(mesh_set)),
         plain_sets(mesh_bindings.make_set(plain_set)),
@@ -200,10 +204,10 @@ struct RenderPeers::Impl {
     return n;
   }
 
-  double draw_chunks(const Renderer& renderer, std::size_t triangles) {
+  double draw_chunks(const Renderer& renderer, VkPipeline pipeline, std::size_t triangles) {
     const std::size_t n = take(renderer), all = n * chunk_index_count / 3;
     const auto indices = std::uint32_t(triangles >= all ? chunk_index_count : 3 * (triangles / n));
-    return measure(tile_bindings, tile_set, chunk_pipeline.get(), [&](VkCommandBuffer c) {
+    return measure(tile_bindings, tile_set, pipeline, [&](VkCommandBuffer c) {
       vkCmdBindIndexBuffer(c, chunk_indices.get(), 0, VK_INDEX_TYPE_UINT32);
       for (std::uint32_t d = 0; d < n; ++d) vkCmdDrawIndexed(c, indices, 1, 0, 0, d);
     });
@@ -224,8 +228,13 @@ double RenderPeers::full_mesh(const Camera& camera) {
                         });
 }
 
-double RenderPeers::plain(const Renderer& renderer, std::size_t n) { return impl_->draw_chunks(renderer, n); }
-double RenderPeers::chunked(const Renderer& renderer) { return impl_->draw_chunks(renderer, SIZE_MAX); }
+double RenderPeers::plain(const Renderer& renderer, std::size_t n) {
+  return impl_->draw_chunks(renderer, impl_->chunk_pipeline.get(), n);
+}
+double RenderPeers::chunked(const Renderer& renderer) { return plain(renderer, SIZE_MAX); }
+double RenderPeers::stitched(const Renderer& renderer) {
+  return impl_->draw_chunks(renderer, impl_->stitched_pipeline.get(), SIZE_MAX);
+}
 
 // Cells as square as their number allows.
 double RenderPeers::covering(std::size_t n) {

@@ -17,7 +17,9 @@ class RenderPeers {
 
   double full_mesh(const Camera& camera);
   /// The tiles that `renderer` drew last, each as 64 x 64 cells; as chunks are drawn, but for their skirts.
+  /// Stitched: without cracks between chunks, to see how far off they are; with more work a vertex.
   double chunked(const Renderer& renderer);
+  double stitched(const Renderer& renderer);
   /// A full-screen triangle with the same shading.
   double full_screen(const Renderer& renderer);
   /// So many indexed triangles without shading: of those tiles, the same share of each; and all over the

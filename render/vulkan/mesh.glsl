@@ -2,7 +2,8 @@
 // its corners is the middle of the longest side of the triangles that it halves: first the middle of the block, then
 // those of its edges, then those of its quarters, and so on. A block's mesh is the set of its vertices, closed
 // so that none is there without the two whose triangles it halves; what a neighbour has on a shared edge
-// besides splits the triangles along it into fans.
+// besides splits the triangles along it into fans. Four blocks that need no vertex may be one quad: two triangles of its
+// corners, or fans around its middle; a side's middle is one of its vertices where it is one beyond.
 #include "terrain.glsl"
 
 // Of each block of each draw.
@@ -11,14 +12,16 @@ struct Mesh {
   uint edges;       // bit 8 s + p: vertex p of side s (TileKey::beside), 1 to 7
   bool seen;
   bool falls;       // alone, its two triangles share the side from (0, 8) to (8, 0); else from (0, 0) to (8, 8)
+  uint quad;        // the block is a part of one: kQuad, and kFlat where two triangles do, kQuadFalls as `falls`
 };
+const uint kQuad = 1u, kFlat = 2u, kQuadFalls = 4u;
 const uint kUnseen = 0x80000000u, kFalls = 0x40000000u, kInsideHigh = 0x1ffffu, kEdges = 0xfefefefeu;
 
 uvec4 packed(Mesh m) {
-  return uvec4(m.inside.x, m.inside.y | (m.seen ? 0 : kUnseen) | (m.falls ? kFalls : 0), m.edges, 0);
+  return uvec4(m.inside.x, m.inside.y | (m.seen ? 0 : kUnseen) | (m.falls ? kFalls : 0), m.edges, m.quad);
 }
 Mesh unpacked(uvec4 t) {
-  return Mesh(uvec2(t.x, t.y & kInsideHigh), t.z, (t.y & kUnseen) == 0, (t.y & kFalls) != 0);
+  return Mesh(uvec2(t.x, t.y & kInsideHigh), t.z, (t.y & kUnseen) == 0, (t.y & kFalls) != 0, t.w);
 }
 
 // Vertices of the mesh are named by their draw and their half cells there. The 9 x 9 of a block differ in their

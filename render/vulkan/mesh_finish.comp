@@ -174,11 +174,31 @@ int place_of(int bit) {
   return s < 2 ? 9 * p + across : 9 * across + p;
 }
 
+// Four blocks as one square, measured by all four: each has one of its quarters and one of the halves at its corner.
+shared vec3 shares[64];  // margin, half, quarter
+
+uvec3 quad_errors(int base, int b, float margin) {
+  const ivec2 at = ivec2(b % 8, b / 8), in_quad = at & 1, middle = (at | 1) * kBlockSamples;
+  const int rep = b - in_quad.x - 8 * in_quad.y, size = kBlockSamples;
+  shares[b].x = margin;
+  barrier();
+  margin = max(max(shares[rep].x, shares[rep + 1].x), max(shares[rep + 8].x, shares[rep + 9].x));
+  const ivec2 inward = 1 - 2 * in_quad, corner = middle - size * inward;
+  const ivec2 sides[] = ivec2[](ivec2(-1, 0), ivec2(1, 0), ivec2(0, -1), ivec2(0, 1));
+  const int which = in_quad.x + 2 * in_quad.y;
+  shares[b].y = half_error(base, corner, ivec2(inward.x, 0), ivec2(0, inward.y), 2 * size, bvec2(false), margin);
+  shares[b].z = quarter_error(base, middle, sides[which], size, true, margin);
+  barrier();
+  const float drops = max(shares[rep].y, shares[rep + 9].y), rises = max(shares[rep + 1].y, shares[rep + 8].y);
+  const float quarters = max(max(shares[rep].z, shares[rep + 1].z), max(shares[rep + 8].z, shares[rep + 9].z));
+  return uvec3(floatBitsToUint(min(drops, rises)), floatBitsToUint(quarters), drops < rises ? 1 : 0);
+}
+
 int code_of(float error) { return (floatBitsToInt(error) + (1 << kCodeShift) - 1) >> kCodeShift; }
 
 // The block's errors, from metres to codes: the steps of floats with four bits of fraction, rounded up, from the
 // largest down. 255 needs its vertices whatever is allowed.
-int write_codes(int first) {
+int write_codes(int first, uvec3 quad) {
   float largest = 0;
   for (int k = 0; k < 81; ++k) largest = worst[k] < kNothing ? max(largest, worst[k]) : largest;
   const int zero = code_of(largest) - 254;
@@ -188,7 +208,7 @@ int write_codes(int first) {
       const float error = worst[place_of(16 * k + b)];
       codes[b >> 2] |= uint(error < kNothing ? clamp(code_of(error) - zero, 0, 254) : 255) << (8 * (b & 3));
     }
-    blocks[first + k] = codes;
+    blocks[first + k] = k + 1 == kQuadErrors ? uvec4(codes.x, quad) : codes;
   }
   return zero;
 }
@@ -213,7 +233,7 @@ void measure(int base, int bound_base, int slot, int b) {
   }
   close_errors();
   const int first = (slot * 64 + b) * kBlock;
-  const int zero = write_codes(first + 1);
+  const int zero = write_codes(first + 1, quad_errors(base, b, margins[0]));
   const float between = push.between * (f.bend.x + f.bend.y), lack = reducible(b, f.bound);
   const vec2 range = vec2(f.low + push.shift - between, f.high + push.shift + between);
   blocks[first] = uvec4(floatBitsToUint(range), zero << 1 | (falls ? 1 : 0), floatBitsToUint(lack));

@@ -21,21 +21,36 @@ Mesh needed(int block, int allowed) {
       found |= (int(codes[b >> 2] >> (8 * (b & 3)) & 255u) > allowed ? 1u : 0u) << b;
     bits[k >> 1] |= found << (16 * (k & 1));
   }
-  return Mesh(uvec2(bits[0], bits[1] & kInsideHigh), bits[2] & kEdges, true, false);
+  return Mesh(uvec2(bits[0], bits[1] & kInsideHigh), bits[2] & kEdges, true, false, 0);
+}
+
+shared float room[64];  // metres that a block's error may have; below 0 where it is no part of a quad
+
+uint quad_of(int b, int draw_block, float metres) {
+  const int rep = b & ~9;
+  room[b] = metres;
+  barrier();
+  const float least = min(min(room[rep], room[rep + 1]), min(room[rep + 8], room[rep + 9]));
+  const uvec4 errors = texelFetch(blocks, draw_block + rep * kBlock + kQuadErrors);
+  if (uintBitsToFloat(errors.z) > least) return 0;
+  return kQuad | (uintBitsToFloat(errors.y) > least ? 0 : kFlat) | (errors.w != 0 ? kQuadFalls : 0);
 }
 
 void main() {
   const int d = int(gl_WorkGroupID.x), b = int(gl_LocalInvocationID.x);
   const Draw draw = draw_at(d);
-  const int block = (draw.slot * 64 + b) * kBlock;
+  const int first = draw.slot * 64 * kBlock, block = first + b * kBlock;
   const uvec4 facts = texelFetch(blocks, block);
   const BlockView view = view_of(draw, b, uintBitsToFloat(facts.xy));
-  Mesh mesh = Mesh(uvec2(0), 0, false, false);
+  Mesh mesh = Mesh(uvec2(0), 0, false, false, 0);
+  float room_here = -1;
   if (view.seen) {
     const float metres = view.depth / (frame.detail.x * stretch_in(view.bottom, view.top)) - uintBitsToFloat(facts.w);
     const bool finest = !(view.depth > frame.axis.w && metres >= 0);
     mesh = needed(block, finest ? -1 : clamp((floatBitsToInt(metres) >> kCodeShift) - (int(facts.z) >> 1), -1, 254));
     mesh.falls = (facts.z & 1u) != 0;
+    if ((mesh.inside.x | mesh.inside.y | mesh.edges) == 0) room_here = metres;
   }
+  mesh.quad = quad_of(b, first, room_here);
   needs[d * 64 + b] = packed(mesh);
 }

@@ -92,9 +92,9 @@ void put_inside(uvec2 inside) {
   }
 }
 
-// Half cells along and away from side s.
-ivec2 from_side(int s, int along, int away) {
-  const int across = (s & 1) != 0 ? kSide - away : away;
+// Half cells along and away from side s of a square.
+ivec2 from_side(int s, int along, int away, int side) {
+  const int across = (s & 1) != 0 ? side - away : away;
   return s < 2 ? ivec2(across, along) : ivec2(along, across);
 }
 
@@ -113,23 +113,42 @@ void put_along(uvec2 inside, uint edges, uvec2 split) {
     const int to = findLSB(left), own_to = findLSB(own >> (own_from + 1)) + own_from + 1;
     const int size = own_to - own_from, half_size = size / 2;
     ivec2 apex = ivec2((own_from & size) != 0 ? own_from : own_to, size);
-    if (size > 1 && has_inside(inside, from_side(s, own_from + own_to, size) / 2))
+    if (size > 1 && has_inside(inside, from_side(s, own_from + own_to, size, kSide) / 2))
       apex = ivec2(own_from + half_size, half_size);
     const bool ahead = s == 1 || s == 2;
-    put(from_side(s, ahead ? from : to, 0), from_side(s, ahead ? to : from, 0), from_side(s, 2 * apex.x, 2 * apex.y));
+    put(from_side(s, ahead ? from : to, 0, kSide), from_side(s, ahead ? to : from, 0, kSide),
+        from_side(s, 2 * apex.x, 2 * apex.y, kSide));
     from = to, left &= left - 1;
     if (to == 2 * own_to) own_from = own_to;
     if (left == 0 && ++s == 4) return;
   }
 }
 
+void put_square(int side, bool falls) {
+  const ivec2 a = ivec2(0), b = ivec2(side, 0), c = ivec2(side), d = ivec2(0, side);
+  if (falls)
+    put(a, b, d), put(b, c, d);
+  else
+    put(a, b, c), put(a, c, d);
+}
+
+// Fans around the middle of a quad, one triangle for each segment between the vertices of `split` (half cells).
+void put_fans(uvec4 split) {
+  const int side = 2 * kSide;
+  int s = 0, from = 0;
+  while (s < 4) {
+    const uint left = from == 31 ? 0 : split[s] >> (from + 1);
+    const int to = left != 0 ? from + 1 + findLSB(left) : side;
+    const bool ahead = s == 1 || s == 2;
+    put(from_side(s, ahead ? from : to, 0, side), from_side(s, ahead ? to : from, 0, side), ivec2(kSide));
+    from = to;
+    if (to == side) ++s, from = 0;
+  }
+}
+
 void put_block(Mesh mesh, uvec2 split) {
   if ((mesh.inside.x | mesh.inside.y | split.x | split.y) == 0) {
-    const ivec2 a = ivec2(0), b = ivec2(kSide, 0), c = ivec2(kSide), d = ivec2(0, kSide);
-    if (mesh.falls)
-      put(a, b, d), put(b, c, d);
-    else
-      put(a, b, c), put(a, c, d);
+    put_square(kSide, mesh.falls);
     return;
   }
   const uint middle = 1u << 24;  // wherever an edge is split
@@ -165,8 +184,17 @@ void main() {
     const uint all = triangles_of(d, int(firsts[g].y));
     if (b == 0) calls[5 * g] = 3 * all, calls[5 * g + 2] = 3 * draws_before;
   }
-  if (!mesh.seen) return;
+  const bool in_quad = (mesh.quad & kQuad) != 0;
+  if (in_quad ? (b & 9) != 0 : !mesh.seen) return;
   first_draw = d, origin = ivec2(b % kBlocks, b / kBlocks) * kSide;
   place = 3 * (draws_before + edge.w);
-  put_block(mesh, edge.xy);
+  if (in_quad) {
+    const uvec4 split = texelFetch(edges, d * 64 + b + 1);
+    if ((mesh.quad & kFlat) != 0 && split == uvec4(0))
+      put_square(2 * kSide, (mesh.quad & kQuadFalls) != 0);
+    else
+      put_fans(split);
+  } else {
+    put_block(mesh, edge.xy);
+  }
 }

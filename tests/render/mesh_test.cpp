@@ -34,7 +34,20 @@ TEST_F(TerrainTest, AMeshShowsWhatHardwareShows) {
 // Of a frame's mesh: a vertex inside an edge of a triangle would tear it open.
 struct Seams {
   std::size_t edges = 0, torn = 0, levels = 0;
-  std::map<std::pair<std::uint32_t, int>, std::int64_t> area;  // half cells^2, twice; by draw and block
+  // Half cells^2, twice; by draw and block, and by the first of four where triangles lie in several of these.
+  std::map<std::pair<std::uint32_t, int>, std::int64_t> area, quads;
+};
+
+// The block that a triangle lies in; the first of four, and that it lies in several of them.
+struct BlockOf {
+  explicit BlockOf(const MeshVertex* v) {
+    const auto [west, east] = std::minmax({v[0].x, v[1].x, v[2].x});
+    const auto [south, north] = std::minmax({v[0].y, v[1].y, v[2].y});
+    several = west / 16 != (east - 1) / 16 || south / 16 != (north - 1) / 16;
+    block = west / 16 + south / 16 * 8, first = block & ~9;
+  }
+  int block, first;
+  bool several;
 };
 
 Seams seams_of(const std::vector<MeshVertex>& mesh, std::span<const TileDraw> draws) {
@@ -47,13 +60,16 @@ Seams seams_of(const std::vector<MeshVertex>& mesh, std::span<const TileDraw> dr
   for (const auto& v : mesh) vertices.insert(place(v.draw, v.x, v.y)), strides.insert(draws[v.draw].stride);
   Seams s;
   s.levels = strides.size();
+  for (std::size_t t = 0; t < mesh.size(); t += 3)
+    if (const BlockOf in(&mesh[t]); in.several) s.quads[{mesh[t].draw, in.first}] = 0;
   for (std::size_t t = 0; t < mesh.size(); t += 3) {
     const MeshVertex *a = &mesh[t], *b = a + 1, *c = a + 2;
-    const int x = (a->x + b->x + c->x) / 48, y = (a->y + b->y + c->y) / 48;
     const std::int64_t twice =
         std::int64_t(b->x - a->x) * (c->y - a->y) - std::int64_t(c->x - a->x) * (b->y - a->y);
     EXPECT_GT(twice, 0);
-    s.area[{a->draw, 8 * y + x}] += twice;
+    const BlockOf in(a);
+    const auto quad = s.quads.find({a->draw, in.first});
+    (quad != s.quads.end() ? quad->second : s.area[{a->draw, in.block}]) += twice;
     for (int k = 0; k < 3; ++k) {
       const MeshVertex &from = mesh[t + std::size_t(k)], &to = mesh[t + std::size_t((k + 1) % 3)];
       const int parts = std::gcd(to.x - from.x, to.y - from.y);
@@ -68,7 +84,7 @@ Seams seams_of(const std::vector<MeshVertex>& mesh, std::span<const TileDraw> dr
 
 TEST_F(TerrainTest, AMeshCoversEachBlockOnceAndNoVertexLiesInsideAnEdge) {
   std::mt19937_64 random(test_seed(25));
-  std::size_t edges = 0, torn = 0, levels = 0;
+  std::size_t edges = 0, torn = 0, levels = 0, blocks = 0, quads = 0;
   for (const double tau : {0.5, 2.0, 8.0}) {
     Renderer r = renderer(tau, Tessellation::mesh);
     for (int n = 0; n < 8; ++n) {
@@ -77,11 +93,15 @@ TEST_F(TerrainTest, AMeshCoversEachBlockOnceAndNoVertexLiesInsideAnEdge) {
       EXPECT_LE(stats.triangles, mesh.size() / 3);
       const Seams s = seams_of(mesh, r.drawn().draws);
       for (const auto& [block, twice] : s.area) EXPECT_EQ(twice, 2 * 16 * 16);
+      for (const auto& [quad, twice] : s.quads) EXPECT_EQ(twice, 2 * 32 * 32);
+      blocks += s.area.size(), quads += s.quads.size();
       edges += s.edges, torn += s.torn, levels = std::max(levels, s.levels);
     }
   }
   EXPECT_GT(edges, 50000u);
   EXPECT_GT(levels, 3u);
+  EXPECT_GT(blocks, 1000u);
+  EXPECT_GT(quads, 500u);
   report_case("EdgeSplit", "edges of 24 meshes with a vertex inside", edges, double(torn), 0, "edges");
 }
 

@@ -73,14 +73,15 @@ TileLattice TileLattice::over(const Database& db) {
   while (std::ldexp(kCells * step, kMaxLevels - 1 - kLarger) < side + step) step *= 2;
   int levels = 1;
   while (std::ldexp(kCells * step, levels - 1 - kLarger) < side + step) ++levels;
-  // All data lie in the middle half of the root, and where they begin is a corner of tiles: where an upright
-  // grid is all there is, no tile has its outline there inside, and of 2^n cells none has any.
+  // All data lie in the root, about in its middle. The finest grid's first sample is a corner of large tiles:
+  // where it lies upright, its samples are measured positions on every level, as far as these are no finer
+  // than its lattice.
   const Point anchor = finest->info.frame.to_domain(0, 0);
-  const double root = std::ldexp(kCells * step, levels - 1);
-  const auto before = [&](double from, double low) {
-    return from - std::ceil((from - low) / step - 1e-6) * step - root / 4;
+  const double root = std::ldexp(kCells * step, levels - 1), tile = root / 4;
+  const auto before = [&](double from, double low, double high) {
+    return from - std::nearbyint((from - (low + high - root) / 2) / tile) * tile;
   };
-  t.half_ = 0.5 * step, t.origin_ = {before(anchor.x, e.xmin), before(anchor.y, e.ymin)};
+  t.half_ = 0.5 * step, t.origin_ = {before(anchor.x, e.xmin, e.xmax), before(anchor.y, e.ymin, e.ymax)};
   std::vector<std::vector<double>> bottoms(static_cast<std::size_t>(levels));
   for (const Grid& g : db.grids())
     for (int l = 0; l < g.info.shape.levels(); ++l) {

@@ -34,9 +34,10 @@ class TileLattice {
   static constexpr int kMaxLevels = 23;            ///< half cells are counted in 31 bits
 
   TileLattice() = default;
-  /// The step of level 0 is the smallest of any grid (or as small as kMaxLevels allow); where that grid lies
-  /// upright, the tiles' vertices are its own. The tolerance of a level is the error that three quarters of
-  /// the patches of its step keep to. Reads a bounded number of records.
+  /// The step of level 0 is a fraction of the smallest of any grid (or as small as kMaxLevels allow). Where
+  /// that grid lies upright, the vertices of its patches are half cells of all tiles that are no coarser. The
+  /// tolerance of a level is the error that three quarters of the patches of its step keep to. Reads a
+  /// bounded number of records.
   static TileLattice over(const Database& db);
 
   /// False where its root does not hold all data, or its finest step is larger than a grid's.

@@ -10,19 +10,27 @@ namespace patchwork {
 
 namespace {
 
+// At most what a grid's samples may be off where a patch lies, metres: what the error of its first patch of
+// level 0 is.
+double floor_under(const Grid& grid, int level, int bx, int by) {
+  const PatchRecord finest = grid.at(0, bx << level, by << level);
+  return finest.exists() ? finest.error[0] : 0;
+}
+
 // A patch with cells smaller than the distance of samples may stick out between these by as much as it
 // departs from the patch of its own grid that they do resolve, twice: up here, down there.
 double missed(const Grid& grid, const PatchId& id, double spacing) {
   const double step = grid.info.frame.finer_step();
   int level = id.level(), bx = id.bx(), by = id.by();
-  if (std::ldexp(step, level) >= spacing * 0.99) return 0;
+  const auto resolved = [&] { return std::ldexp(step, level) >= spacing * 0.99; };
+  if (resolved()) return 0;
   double bottom = grid.at(level, bx, by).bottom;
-  while (std::ldexp(step, level) < spacing * 0.99 && level + 1 < grid.info.shape.levels()) {
+  while (!resolved() && level + 1 < grid.info.shape.levels()) {
     ++level, bx >>= 1, by >>= 1;
     const PatchRecord p = grid.at(level, bx, by);
     if (p.exists()) bottom = std::max(bottom, p.bottom);
   }
-  return 2 * std::max(0.0, bottom - grid.info.accuracy);
+  return 2 * std::max(0.0, bottom - floor_under(grid, level, bx, by));
 }
 
 // The blocks of a tile that an extent covers a part of; not those that it only touches.
@@ -58,37 +66,50 @@ TilePatches TilePatches::of(const Database& db, std::span<const Blend::Placed> p
   TilePatches t;
   const Extent own = lattice.bounds(tile), all = with_halo(lattice, tile);
   const double spacing = 0.5 * lattice.step(tile.level);
+  const bool exact = lattice.error(tile.level) == 0;
+  constexpr float kAll = std::numeric_limits<float>::infinity();
   bool best = true;
-  const Database::Reading reading = db.reading();
-  for (const Blend::Placed& p : placed) {
-    if (!p.bounds.meets(all)) continue;
-    const Grid& grid = db.grid(p.id.grid());
-    ++t.patches, t.heights.add(grid.info.surface_heights());
-    best = best && grid.at(p.id.level(), p.id.bx(), p.id.by()).best();
-    const float more = float_at_least(missed(grid, p.id, spacing));
-    blocks_in(p.bounds, own).each([&](std::size_t b) {
-      t.blocks[b].unsampled = std::max(t.blocks[b].unsampled, more);
-    });
+  {
+    const Database::Reading reading = db.reading();
+    for (const Blend::Placed& p : placed) {
+      if (!p.bounds.meets(all)) continue;
+      const Grid& grid = db.grid(p.id.grid());
+      const int level = p.id.level(), bx = p.id.bx(), by = p.id.by();
+      ++t.patches, t.heights.add(grid.info.surface_heights());
+      best = best && grid.at(level, bx, by).best();
+      const float more = float_at_least(missed(grid, p.id, spacing));
+      const float lasting = exact ? kAll : float_at_most(floor_under(grid, level, bx, by));
+      blocks_in(p.bounds, own).each([&](std::size_t b) {
+        Block& block = t.blocks[b];
+        block.lasting = block.reached() ? std::min(block.lasting, lasting) : lasting;
+        block.unsampled = std::max(block.unsampled, more);
+      });
+    }
   }
-  if (lattice.error(tile.level) == 0 || (best && !is_improvable(db, ids, all))) {
-    for (Block& b : t.blocks) b.lasting = std::numeric_limits<float>::infinity();
+  if (exact) return t;
+  if (best && !is_improvable(db, ids, all)) {
+    for (Block& b : t.blocks) b.lasting = kAll;
     return t;
   }
   // Where there are several grids, the best surface may be another one's.
   std::array<int, kBlocks * kBlocks> grids{};
-  for (const Grid& grid : db.grids()) {
-    const Extent e = grid.info.bounds();
-    if (!e.meets(own)) continue;
-    const float lasting = float_at_most(grid.info.accuracy + grid.info.quantisation);
-    blocks_in(e, own).each([&](std::size_t b) { t.blocks[b].lasting = grids[b]++ == 0 ? lasting : 0; });
-  }
+  for (const Grid& grid : db.grids())
+    if (const Extent e = grid.info.bounds(); e.meets(own))
+      blocks_in(e, own).each([&](std::size_t b) {
+        if (++grids[b] > 1) t.blocks[b].lasting = 0;
+      });
   return t;
 }
 
 void TilePatches::prefetch(const Database& db, const std::vector<PatchId>& ids, const TileLattice& lattice,
                            const TileKey& tile) {
-  const Database::Reading reading = db.reading();
-  for (const PatchId id : ids) missed(db.grid(id.grid()), id, 0.5 * lattice.step(tile.level));
+  {
+    const Database::Reading reading = db.reading();
+    for (const PatchId id : ids) {
+      const Grid& grid = db.grid(id.grid());
+      missed(grid, id, 0.5 * lattice.step(tile.level)), floor_under(grid, id.level(), id.bx(), id.by());
+    }
+  }
   if (lattice.error(tile.level) > 0) is_improvable(db, ids, with_halo(lattice, tile));
 }
 

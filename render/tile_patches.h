@@ -20,9 +20,9 @@ struct TilePatches {
     /// What may stick out between the samples of a half cell, because cells are smaller than that; below 0
     /// where no patch reaches the block, but for its border.
     float unsampled = -1;
-    /// The share of a bound that no finer patch takes away: the accuracy of the grid, where there is only
-    /// one, since its patches lie within the rest of its bilinear surface; all of it where the tile has the
-    /// best patches there are.
+    /// The share of a bound that no finer patch takes away: what the grid's samples may be off there, where
+    /// there is only one, since its patches lie within the rest of its bilinear surface; all of it where the
+    /// tile has the best patches there are.
     float lasting = 0;
 
     bool reached() const { return unsampled >= 0; }

@@ -24,6 +24,24 @@ Mesh needed(int block, int allowed) {
   return Mesh(uvec2(bits[0], bits[1] & kInsideHigh), bits[2] & kEdges, true, false, 0);
 }
 
+// A finer neighbour's vertex without data would take a whole triangle of this block's away, as far as that reaches.
+bool beside_holes(int d, ivec2 b) {
+  bool any = false;
+  for (int s = 0; s < 4; ++s) {
+    const int along = s < 2 ? b.y : b.x;
+    if (b != at_side(s, along)) continue;
+    const uint other = texelFetch(draws, d * kDraw + (along < kBlocks / 2 ? 7 : 8))[s];
+    if (other == kAlone || (other & kFiner) == 0) continue;
+    const int slot = draw_at(int(other & kNumber)).slot, first = 2 * (along % (kBlocks / 2));
+    for (int k = 0; k < 2; ++k) {
+      const ivec2 theirs = at_side(s ^ 1, first + k);
+      const int at = (slot * 64 + theirs.y * kBlocks + theirs.x) * kBlock;
+      any = any || (texelFetch(blocks, at).z & kHolesAlong << (s ^ 1)) != 0;
+    }
+  }
+  return any;
+}
+
 shared float room[64];  // metres that a block's error may have; below 0 where it is no part of a quad
 
 uint quad_of(int b, int draw_block, float metres) {
@@ -46,10 +64,10 @@ void main() {
   float room_here = -1;
   if (view.seen) {
     const float metres = view.depth / (frame.detail.x * stretch_in(view.bottom, view.top)) - uintBitsToFloat(facts.w);
-    const bool finest = !(view.depth > frame.axis.w && metres >= 0);
-    mesh = needed(block, finest ? -1 : clamp((floatBitsToInt(metres) >> kCodeShift) - (int(facts.z) >> 1), -1, 254));
-    mesh.falls = (facts.z & 1u) != 0;
-    if ((mesh.inside.x | mesh.inside.y | mesh.edges) == 0) room_here = metres;
+    const bool finest = !(view.depth > frame.axis.w && metres >= 0) || beside_holes(d, ivec2(b % kBlocks, b / kBlocks));
+    mesh = needed(block, finest ? -1 : clamp((floatBitsToInt(metres) >> kCodeShift) - (int(facts.z) >> kFlagBits), -1, 254));
+    mesh.falls = (facts.z & kBlockFalls) != 0;
+    if (!finest && (mesh.inside.x | mesh.inside.y | mesh.edges) == 0) room_here = metres;
   }
   mesh.quad = quad_of(b, first, room_here);
   needs[d * 64 + b] = packed(mesh);

@@ -7,18 +7,20 @@ layout(constant_id = 1) const bool kPublished = false;
 
 // Over a cell of `size` half cells: the span of what is left of the surface when a plane is taken away. No
 // triangle with its vertices on the surface and inside the cell is farther from the surface than that: both
-// are within [least, most] of the plane.
+// are within [least, most] of the plane. 0 where there are holes.
 float span(int base, ivec2 from, int size) {
   const float a = height_at(base, from), b = height_at(base, from + ivec2(size, 0));
   const float c = height_at(base, from + ivec2(0, size)), d = height_at(base, from + ivec2(size));
   const vec2 slope = vec2((b - a) + (d - c), (c - a) + (d - b)) / float(2 * size);
   float least = kNothing, most = -kNothing;
+  bool holes = false;
   for (int r = 0; r <= size; ++r)
     for (int k = 0; k <= size; ++k) {
       const float h = height_at(base, from + ivec2(k, r)) - a - dot(slope, vec2(k, r));
+      holes = holes || isnan(h);
       least = min(least, h), most = max(most, h);
     }
-  return most - least;
+  return holes ? 0 : most - least;
 }
 
 float largest_span(int base, ivec2 block, int size) {
@@ -52,16 +54,18 @@ void measure(int base, int bound_base, int slot, int b) {
   const ivec2 block = ivec2(b % 8, b / 8) * kBlockSamples;
   const BlockFacts f = facts_of(base, bound_base, b);
   const float between = push.between * (f.bend.x + f.bend.y);
+  const float finest = between + largest_span(base, block, 2);
   vec4 error = vec4(kNothing);
   const float lack = reducible(b, f.bound);
   vec3 own = vec3(kPublished ? kNothing : lack);
   if (!f.holes) {
     for (int d = 0; kPublished && d < 3; ++d) own[d] = published(base, block, 4 << d);
-    for (int d = 0; d < 4; ++d) error[d] = between + largest_span(base, block, 2 << d);
+    error.x = finest;
+    for (int d = 1; d < 4; ++d) error[d] = between + largest_span(base, block, 2 << d);
     for (int d = 1; d < 4; ++d) error[d] = max(error[d], error[d - 1]);
   }
   const vec2 range = vec2(f.low + push.shift - between, f.high + push.shift + between);
   blocks[(slot * 64 + b) * 2] = floatBitsToUint(vec4(error.yzw, own.x));
   blocks[(slot * 64 + b) * 2 + 1] = floatBitsToUint(vec4(range, own.yz));
-  note_facts(b, f, between, error.x, lack);
+  note_facts(b, f, between, finest, lack);
 }

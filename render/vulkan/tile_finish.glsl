@@ -72,11 +72,11 @@ float reducible(int b, float bound) {
   return max(0, lack.x) + max(0, bound - lack.y);
 }
 
-// `error`: of the block with all its vertices, where it has no holes; `lack`: reducible().
+// `error`: of the block with all its vertices, where it has data; `lack`: reducible().
 void note_facts(int b, BlockFacts f, float between, float error, float lack) {
   const uint first = (gl_WorkGroupID.x * 64 + b) * kSummary;
   summaries[first] = f.low - between, summaries[first + 1] = f.high + between;
-  summaries[first + 2] = lack + (f.holes ? 0 : error), summaries[first + 3] = f.bound, summaries[first + 4] = f.holes ? 1 : 0;
+  summaries[first + 2] = lack + error, summaries[first + 3] = f.bound, summaries[first + 4] = f.holes ? 1 : 0;
 }
 
 void measure(int base, int bound_base, int slot, int b);

@@ -133,9 +133,9 @@ struct TileMaker::Impl {
     f.patches = patches.patches;
     HeightRange all;
     for (int b = 0; b < int(kBlocks); ++b, s += kSummary) {
-      if (!patches.blocks[std::size_t(b)].reached()) continue;
-      const bool holes = s[4] > 0;
-      f.holes |= holes;
+      const bool reached = patches.blocks[std::size_t(b)].reached(), holes = s[4] > 0;
+      f.holes |= holes || !reached;
+      if (!reached) continue;
       HeightRange heights{double(s[0]) + shift, double(s[1]) + shift};
       // All of its data may lie between its samples.
       if (!(heights.lowest <= heights.highest)) heights = patches.heights;

@@ -42,7 +42,7 @@ struct RendererOptions {
   double far =
       std::numeric_limits<double>::infinity();  ///< metres along the line of sight; tiles beyond are left out
   std::size_t memory = std::size_t{512} << 20;  ///< bytes on the card: half for tiles, half for patches
-  TilePolicy policy = TilePolicy::lru_error;    ///< the fastest of `patchwork bench tiles`
+  TilePolicy policy = TilePolicy::lru;          ///< the fastest of `patchwork bench tiles`
   Color background{0xbf, 0xd4, 0xe8};
   /// Frames do not wait: missing tiles are read by workers and made within make_ms a frame.
   bool realtime = false;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <numeric>
 #include <thread>
 
 #include "db/stopwatch.h"
@@ -59,8 +60,8 @@ class Path {
 };
 
 // The default first.
-const std::pair<TilePolicy, const char*> kPolicies[] = {{TilePolicy::lru_error, "smallest error"},
-                                                        {TilePolicy::lru, "least recently used"},
+const std::pair<TilePolicy, const char*> kPolicies[] = {{TilePolicy::lru, "least recently used"},
+                                                        {TilePolicy::lru_error, "smallest error"},
                                                         {TilePolicy::first, "first available"}};
 
 // One way along the path with a pool that holds little more than a view.
@@ -73,7 +74,7 @@ Work policies(const std::shared_ptr<Device>& device, const Database& db, const s
                {.width = kWidth,
                 .height = kHeight,
                 .pixel_error = kPixelError,
-                .memory = std::size_t{96} << 20,
+                .memory = std::size_t{40} << 20,
                 .policy = policy});
     std::vector<double> ms;
     std::size_t made = 0;
@@ -84,8 +85,10 @@ Work policies(const std::shared_ptr<Device>& device, const Database& db, const s
       ms.push_back(s.total_ms), made += s.tiles_made, bookkeeping += s.select_ms;
     }
     times.push_back(Spread::of(ms));
-    answer[name] = {
-        {"tiles_made", made}, {"evictions", r.cache().evictions()}, {"bookkeeping_ms", bookkeeping}};
+    answer[name] = {{"tiles_made", made},
+                    {"evictions", r.cache().evictions()},
+                    {"bookkeeping_ms", bookkeeping},
+                    {"total_ms", std::accumulate(ms.begin(), ms.end(), 0.0)}};
   }
   Work w{"policy, " + kind, "ms a frame", true, times[0], {}, answer};
   for (std::size_t p = 1; p < times.size(); ++p) w.peers.emplace_back(kPolicies[p].second, times[p]);

@@ -24,13 +24,16 @@ double missed(const Grid& grid, const PatchId& id, double spacing) {
   int level = id.level(), bx = id.bx(), by = id.by();
   const auto resolved = [&] { return std::ldexp(step, level) >= spacing * 0.99; };
   if (resolved()) return 0;
-  double bottom = grid.at(level, bx, by).bottom;
+  const auto departure = [&] {
+    const PatchRecord p = grid.at(level, bx, by);
+    return p.exists() ? p.bottom - floor_under(grid, level, bx, by) : 0;
+  };
+  double most = departure();
   while (!resolved() && level + 1 < grid.info.shape.levels()) {
     ++level, bx >>= 1, by >>= 1;
-    const PatchRecord p = grid.at(level, bx, by);
-    if (p.exists()) bottom = std::max(bottom, p.bottom);
+    most = std::max(most, departure());
   }
-  return 2 * std::max(0.0, bottom - floor_under(grid, level, bx, by));
+  return 2 * std::max(0.0, most);
 }
 
 // The blocks of a tile that an extent covers a part of; not those that it only touches.
@@ -103,14 +106,16 @@ TilePatches TilePatches::of(const Database& db, std::span<const Blend::Placed> p
 
 void TilePatches::prefetch(const Database& db, const std::vector<PatchId>& ids, const TileLattice& lattice,
                            const TileKey& tile) {
+  const bool exact = lattice.error(tile.level) == 0;
   {
     const Database::Reading reading = db.reading();
     for (const PatchId id : ids) {
       const Grid& grid = db.grid(id.grid());
-      missed(grid, id, 0.5 * lattice.step(tile.level)), floor_under(grid, id.level(), id.bx(), id.by());
+      missed(grid, id, 0.5 * lattice.step(tile.level));
+      if (!exact) floor_under(grid, id.level(), id.bx(), id.by());
     }
   }
-  if (lattice.error(tile.level) > 0) is_improvable(db, ids, with_halo(lattice, tile));
+  if (!exact) is_improvable(db, ids, with_halo(lattice, tile));
 }
 
 }  // namespace patchwork

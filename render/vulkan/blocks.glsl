@@ -3,6 +3,34 @@
 
 const float kFar = 1e30;
 
+// Of a block of a slot: bit s for holes along its side s.
+uint holes_along(int slot, int b);
+
+// May a vertex on the block's rim be without data where the tile has some? It is the finest tile's that has it, and takes
+// away all triangles that have it, as far as they reach.
+bool meets_holes(int d, int slot, int b) {
+  if (texelFetch(draws, d * kDraw + 9).y == 0) return false;  // nor has any tile that shares its vertices
+  const ivec2 at = ivec2(b % kBlocks, b / kBlocks);
+  bool any = false;
+  for (int k = 0; k < 4; ++k) {
+    const ivec2 corner = (at + ivec2(k & 1, k >> 1)) * (2 * kBlockCells);
+    const int own = (slot * kVertices + corner.y / 2) * kVertices + corner.x / 2;
+    any = any || isnan(texelFetch(heights, texel_of(d, slot, corner)).x) && !isnan(texelFetch(heights, own).x);
+  }
+  for (int s = 0; s < 4; ++s) {
+    const int along = s < 2 ? at.y : at.x;
+    if (at != at_side(s, along)) continue;
+    const uint other = texelFetch(draws, d * kDraw + (along < kBlocks / 2 ? 7 : 8))[s];
+    if (other == kAlone || (other & kFiner) == 0) continue;
+    const int theirs = draw_at(int(other & kNumber)).slot, first = 2 * (along % (kBlocks / 2));
+    for (int k = 0; k < 2; ++k) {
+      const ivec2 beyond = at_side(s ^ 1, first + k);
+      any = any || (holes_along(theirs, beyond.y * kBlocks + beyond.x) >> (s ^ 1) & 1u) != 0;
+    }
+  }
+  return any;
+}
+
 // The largest of dot(n, corner).
 float largest_along(vec3 n, vec3 low, vec3 high) {
   return n.x * (n.x > 0 ? high.x : low.x) + n.y * (n.y > 0 ? high.y : low.y) + n.z * (n.z > 0 ? high.z : low.z);

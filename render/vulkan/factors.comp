@@ -11,10 +11,13 @@ layout(local_size_x = 64) in;  // the blocks of a tile
 
 layout(binding = 3) uniform usamplerBuffer blocks;  // two texels a block, floats, metres: errors when every 2nd, 4th,
                                                    // 8th vertex is kept, lowest, highest; in the other three places those
-                                                   // errors as published, or what its patches lack
+                                                   // errors as published, or what its patches lack,
+                                                   // and holes_along
 layout(binding = 4) writeonly buffer Factors { uint factors[]; };
 
 const uint kOut = 256u;
+
+uint holes_along(int slot, int b) { return texelFetch(blocks, (slot * 64 + b) * 2 + 1).z; }
 
 void main() {
   const int d = int(gl_WorkGroupID.x), b = int(gl_LocalInvocationID.x);
@@ -26,7 +29,7 @@ void main() {
   const float nearest = published ? dot(frame.axis.xyz, 0.5 * (view.bottom + view.top)) : view.depth;
   const vec3 error = published ? vec3(errors.w, range.zw) : errors.xyz;
   uint segments = 8;
-  if (nearest > frame.axis.w) {
+  if (nearest > frame.axis.w && (published || !meets_holes(d, draw.slot, b))) {
     // As published: one number for all of the picture, though its corners show more.
     const float stretch = published ? 1.0 : stretch_in(view.bottom, view.top);
     const float allowed = nearest / (frame.detail.x * stretch) - (published ? 0.0 : errors.w);

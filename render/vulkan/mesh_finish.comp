@@ -213,17 +213,6 @@ int write_codes(int first, uvec3 quad) {
   return zero;
 }
 
-// Bit s: some sample of side s has no data.
-uint holes_along(int base, ivec2 block) {
-  uint sides = 0;
-  for (int s = 0; s < 4; ++s)
-    for (int k = 0; k <= kBlockSamples; ++k) {
-      const int across = (s & 1) * kBlockSamples;
-      sides |= isnan(height_at(base, block + (s < 2 ? ivec2(across, k) : ivec2(k, across)))) ? 1u << s : 0;
-    }
-  return sides;
-}
-
 void measure(int base, int bound_base, int slot, int b) {
   const ivec2 here = ivec2(b % 8, b / 8), block = here * kBlockSamples;
   for (int k = 0; k < 64; ++k) bends[k] = vec3(0);
@@ -247,6 +236,6 @@ void measure(int base, int bound_base, int slot, int b) {
   const int zero = write_codes(first + 1, quad_errors(base, b, margins[0]));
   const float between = push.between * (f.bend.x + f.bend.y), lack = reducible(b, f.bound);
   const vec2 range = vec2(f.low + push.shift - between, f.high + push.shift + between);
-  blocks[first] = uvec4(floatBitsToUint(range), zero << kFlagBits | int(holes_along(base, block)) << 1 | (falls ? 1 : 0), floatBitsToUint(lack));
+  blocks[first] = uvec4(floatBitsToUint(range), zero << kFlagBits | int(holes_along(base, block) << kHolesShift) | (falls ? 1 : 0), floatBitsToUint(lack));
   note_facts(b, f, between, finest, lack);
 }

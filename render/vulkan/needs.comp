@@ -11,6 +11,8 @@ layout(local_size_x = 64) in;  // the blocks of a tile
 layout(binding = 3) uniform usamplerBuffer blocks;  // mesh_codes.glsl
 layout(binding = 4) writeonly buffer Needs { uvec4 needs[]; };
 
+uint holes_along(int slot, int b) { return texelFetch(blocks, (slot * 64 + b) * kBlock).z >> kHolesShift; }
+
 // Vertices whose code exceeds what is allowed; below 0 all of them.
 Mesh needed(int block, int allowed) {
   uint bits[3] = uint[](0, 0, 0);
@@ -22,24 +24,6 @@ Mesh needed(int block, int allowed) {
     bits[k >> 1] |= found << (16 * (k & 1));
   }
   return Mesh(uvec2(bits[0], bits[1] & kInsideHigh), bits[2] & kEdges, true, false, 0);
-}
-
-// A finer neighbour's vertex without data would take a whole triangle of this block's away, as far as that reaches.
-bool beside_holes(int d, ivec2 b) {
-  bool any = false;
-  for (int s = 0; s < 4; ++s) {
-    const int along = s < 2 ? b.y : b.x;
-    if (b != at_side(s, along)) continue;
-    const uint other = texelFetch(draws, d * kDraw + (along < kBlocks / 2 ? 7 : 8))[s];
-    if (other == kAlone || (other & kFiner) == 0) continue;
-    const int slot = draw_at(int(other & kNumber)).slot, first = 2 * (along % (kBlocks / 2));
-    for (int k = 0; k < 2; ++k) {
-      const ivec2 theirs = at_side(s ^ 1, first + k);
-      const int at = (slot * 64 + theirs.y * kBlocks + theirs.x) * kBlock;
-      any = any || (texelFetch(blocks, at).z & kHolesAlong << (s ^ 1)) != 0;
-    }
-  }
-  return any;
 }
 
 shared float room[64];  // metres that a block's error may have; below 0 where it is no part of a quad
@@ -64,7 +48,7 @@ void main() {
   float room_here = -1;
   if (view.seen) {
     const float metres = view.depth / (frame.detail.x * stretch_in(view.bottom, view.top)) - uintBitsToFloat(facts.w);
-    const bool finest = !(view.depth > frame.axis.w && metres >= 0) || beside_holes(d, ivec2(b % kBlocks, b / kBlocks));
+    const bool finest = !(view.depth > frame.axis.w && metres >= 0) || meets_holes(d, draw.slot, b);
     mesh = needed(block, finest ? -1 : clamp((floatBitsToInt(metres) >> kCodeShift) - (int(facts.z) >> kFlagBits), -1, 254));
     mesh.falls = (facts.z & kBlockFalls) != 0;
     if (!finest && (mesh.inside.x | mesh.inside.y | mesh.edges) == 0) room_here = metres;

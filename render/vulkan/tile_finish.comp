@@ -57,7 +57,7 @@ void measure(int base, int bound_base, int slot, int b) {
   const float finest = between + largest_span(base, block, 2);
   vec4 error = vec4(kNothing);
   const float lack = reducible(b, f.bound);
-  vec3 own = vec3(kPublished ? kNothing : lack);
+  vec3 own = vec3(kNothing);
   if (!f.holes) {
     for (int d = 0; kPublished && d < 3; ++d) own[d] = published(base, block, 4 << d);
     error.x = finest;
@@ -65,7 +65,8 @@ void measure(int base, int bound_base, int slot, int b) {
     for (int d = 1; d < 4; ++d) error[d] = max(error[d], error[d - 1]);
   }
   const vec2 range = vec2(f.low + push.shift - between, f.high + push.shift + between);
-  blocks[(slot * 64 + b) * 2] = floatBitsToUint(vec4(error.yzw, own.x));
-  blocks[(slot * 64 + b) * 2 + 1] = floatBitsToUint(vec4(range, own.yz));
+  const uvec3 last = kPublished ? floatBitsToUint(own) : uvec3(floatBitsToUint(lack), holes_along(base, block), 0);
+  blocks[(slot * 64 + b) * 2] = uvec4(floatBitsToUint(error.yzw), last.x);
+  blocks[(slot * 64 + b) * 2 + 1] = uvec4(floatBitsToUint(range), last.yz);
   note_facts(b, f, between, finest, lack);
 }

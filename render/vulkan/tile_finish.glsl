@@ -79,6 +79,17 @@ void note_facts(int b, BlockFacts f, float between, float error, float lack) {
   summaries[first + 2] = lack + error, summaries[first + 3] = f.bound, summaries[first + 4] = f.holes ? 1 : 0;
 }
 
+// Bit s: some sample of side s has no data.
+uint holes_along(int base, ivec2 block) {
+  uint sides = 0;
+  for (int s = 0; s < 4; ++s)
+    for (int k = 0; k <= kBlockSamples; ++k) {
+      const int across = (s & 1) * kBlockSamples;
+      sides |= isnan(height_at(base, block + (s < 2 ? ivec2(across, k) : ivec2(k, across)))) ? 1u << s : 0;
+    }
+  return sides;
+}
+
 void measure(int base, int bound_base, int slot, int b);
 
 void main() {
